@@ -87,7 +87,7 @@ impl Table {
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
         let (connection, io_thread) =
-            Connection::start(port, &options.clock, handshake::UNKNOWN_CONTROLLER)?;
+            Connection::start(port, &options.clock, handshake::unknown_controller())?;
         let (identity, was_stopped) = handshake::run(&connection, resets, options)?;
         Ok(Table {
             connection,

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use super::TableOptions;
 use super::error::TurntableError;
-use super::family::Family;
 use super::identity::{GrblSettings, Identity, offers_extras};
 use super::io_thread::Connection;
 use super::protocol::{ControllerState, Counts, LineFault, LineOutcome, Message, ReplyTimeout};
@@ -29,13 +28,12 @@ const POLL_STAMPED: Duration = Duration::from_micros(66_667);
 const POLL_STOCK: Duration = Duration::from_millis(200);
 
 /// What is assumed of a controller until its identity is known.
-pub(super) const UNKNOWN_CONTROLLER: ControllerFeatures = ControllerFeatures {
-    family: Family::Grbl,
-    poll: POLL_STOCK,
-    stamps: false,
-    reports_homing: false,
-    step_deg: 0.0,
-};
+pub(super) fn unknown_controller() -> ControllerFeatures {
+    ControllerFeatures {
+        poll: POLL_STOCK,
+        ..ControllerFeatures::default()
+    }
+}
 
 /// Identifies the controller, stops the table if it moves, and opens a checked session if the
 /// controller offers one. The second value tells whether it had to be stopped.

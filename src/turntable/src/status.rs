@@ -1,8 +1,8 @@
 //! The status of a table.
 
 use super::codes::Alarm;
-use super::protocol::ControllerState;
-use super::supervisor::{PositionReport, Supervisor};
+use super::protocol::{ControllerState, StatusReport};
+use super::supervisor::Supervisor;
 
 /// The status of a table by a fresh report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -30,13 +30,13 @@ pub struct TableStatus {
 }
 
 impl TableStatus {
-    pub(super) fn new(report: &PositionReport, supervisor: &Supervisor) -> TableStatus {
+    pub(super) fn new(report: &StatusReport, supervisor: &Supervisor) -> TableStatus {
         let zero = supervisor.zero_deg();
         TableStatus {
             state: report.state,
             angle_deg: report.machine_deg - zero.unwrap_or(0.0),
             machine_deg: report.machine_deg,
-            degrees_per_second: report.speed,
+            degrees_per_second: report.feed.unwrap_or(0.0) / 60.0,
             battery_v: report.battery_v,
             index: report.pins.index,
             emergency_stop: report.pins.emergency_stop,

@@ -9,9 +9,9 @@ use super::angle_fit::AngleFit;
 use super::error::TurntableError;
 use super::grbl_client::{Table, straight};
 use super::plan::TurnPlan;
-use super::protocol::{ControllerState, Message};
+use super::protocol::{ControllerState, Message, StatusReport};
 use super::status::TableStatus;
-use super::supervisor::{MotionFault, PositionReport};
+use super::supervisor::MotionFault;
 
 /// Rest before the start, until the table has stopped swinging.
 const SETTLE: Duration = Duration::from_millis(300);
@@ -88,7 +88,7 @@ impl<'table> Turn<'table> {
     }
 
     /// Degrees since the speed became constant; negative before.
-    fn gone(&self, report: &PositionReport) -> f64 {
+    fn gone(&self, report: &StatusReport) -> f64 {
         let angle = report.machine_deg - self.zero_deg - self.plan.constant_from_deg();
         angle * self.plan.sign
     }
@@ -105,7 +105,7 @@ impl<'table> Turn<'table> {
             if supervisor.fault().is_some() {
                 return Some(None);
             }
-            let constant = |report: &&PositionReport| {
+            let constant = |report: &&StatusReport| {
                 report.state == ControllerState::Run && self.gone(report) >= 0.0
             };
             let report = supervisor.recorded().iter().rev().find(constant)?;
@@ -206,7 +206,7 @@ impl<'table> Turn<'table> {
     }
 
     /// Ends the monitoring; returns the reports.
-    fn leave(&mut self) -> Vec<PositionReport> {
+    fn leave(&mut self) -> Vec<StatusReport> {
         self.over = true;
         let mut supervisor = self.table.connection().supervisor();
         supervisor.end_motion();

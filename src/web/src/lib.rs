@@ -1,7 +1,7 @@
 //! What the pages of the programs share: who gets in, how much clients may take up, and answers in words
 //! to what cannot be served.
 //!
-//! A server keeps an [`AccessPolicy`], puts [`guard`] around its routes and [`run`]s them on a listener.
+//! A [`PageServer`] makes an [`AccessPolicy`], by which [`guard`] protects the routes.
 //! [`index`] lets a browser in that comes with the [`Token`] in its URL; the [`Announcement`] holds that
 //! URL. The crate knows nothing of what is served: neither the rig nor masks; [`SKETCH`] are the scripts and the style
 //! by which pages let a person draw.
@@ -20,7 +20,7 @@ pub use access::{AccessPolicy, LocalAddress, guard};
 pub use address::Announcement;
 pub use failure::Failure;
 pub use forward::forward;
-pub use listen::{ConnectionLimits, GRACE, Shutdown, run, serve_page};
+pub use listen::{ConnectionLimits, PageServer, Shutdown, serve_page};
 pub use listen_address::ListenAddress;
 pub use page::{IndexPage, PageAsset, SCRIPT, SKETCH, STYLE, TokenQuery, asset, index};
 pub use request_body::{BodyLimit, JsonBody, QueryParams, SKETCH_LIMIT};

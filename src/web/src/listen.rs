@@ -24,9 +24,9 @@ use crate::address::Announcement;
 use crate::token::Token;
 
 /// Time that running requests get when the server ends.
-pub const GRACE: Duration = Duration::from_secs(1);
-/// Threads of a page's server that carry requests; work has its own.
-const PAGE_THREADS: usize = 2;
+const GRACE: Duration = Duration::from_secs(1);
+/// Threads of a server that carry requests; work has its own.
+const THREADS: usize = 2;
 /// Header lines of a request.
 const MAX_HEADERS: usize = 64;
 /// Bytes of a request's head, and of an answer that wait to be sent beyond the piece at hand.
@@ -61,28 +61,63 @@ impl Default for ConnectionLimits {
     }
 }
 
-/// Serves `router` until `shutdown` is cancelled. `connections` has as many permits as the limits allow
-/// connections; each holds one while it is open. Requests carry a [`LocalAddress`].
-pub async fn run(
-    listener: TcpListener,
-    router: Router,
-    limits: ConnectionLimits,
-    connections: &Arc<Semaphore>,
-    shutdown: &Shutdown,
-) {
-    let accepting = accept(listener, router, limits, connections, shutdown);
-    shutdown.run_until_cancelled(accepting).await;
-    let all = u32::try_from(limits.connections).unwrap_or(u32::MAX);
-    // Who is not ready by then is cut off.
-    let _ = timeout(GRACE, connections.acquire_many(all)).await;
+/// A page, and where and for whom it is served.
+pub struct PageServer {
+    /// The address; its port may be 0 for any free one.
+    pub address: SocketAddr,
+    /// What clients have to know. Without one, a random one is made if other machines can reach the address.
+    pub token: Option<Token>,
+    /// The names by which the machine is known.
+    pub names: Vec<String>,
+    /// Paths that need no token.
+    pub open_paths: Vec<&'static str>,
+    /// What connections may take up.
+    pub limits: ConnectionLimits,
+    /// Changes the server's threads from the usual ones.
+    pub threads: fn(&mut tokio::runtime::Builder),
 }
 
-/// Serves a page from its own threads until `shutdown` is cancelled, with the usual limits. The address's port may be 0 for any
-/// free one. Without a token, a random one is made if other machines can reach the address. `names` are those
-/// by which the machine is known, `open_paths` need no token, `announce` is called once, when a browser can connect.
+impl PageServer {
+    /// Serves the page from its own threads until `shutdown` is cancelled. Requests carry a [`LocalAddress`]. `announce`
+    /// is called once, by one of the server's threads, when a browser can connect.
+    ///
+    /// # Errors
+    /// If the address cannot be listened on, or the system has no randomness or no threads.
+    pub fn serve(
+        self,
+        router: impl FnOnce(Arc<AccessPolicy>) -> Router,
+        announce: impl FnOnce(&Announcement),
+        shutdown: &Shutdown,
+    ) -> io::Result<()> {
+        let listener = std::net::TcpListener::bind(self.address)?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let token = match self.token {
+            None if !address.ip().is_loopback() => Some(Token::random()?),
+            given => given,
+        };
+        let announcement = Announcement::new(address, &self.names, token.as_ref());
+        let policy = AccessPolicy::new(address.port(), token, self.names, self.open_paths);
+        let router = router(Arc::new(policy));
+        let mut runtime = tokio::runtime::Builder::new_multi_thread();
+        runtime.worker_threads(THREADS).thread_name("relit-http");
+        (self.threads)(&mut runtime);
+        let runtime = runtime.enable_io().enable_time().build()?;
+        let served = runtime.block_on(async {
+            let listener = TcpListener::from_std(listener)?;
+            announce(&announcement);
+            run(listener, router, self.limits, shutdown).await;
+            Ok(())
+        });
+        runtime.shutdown_timeout(GRACE);
+        served
+    }
+}
+
+/// Serves a page with the usual limits and threads: [`PageServer::serve`].
 ///
 /// # Errors
-/// If the address cannot be listened on, or the system has no randomness or no threads.
+/// As there.
 pub fn serve_page(
     address: SocketAddr,
     token: Option<Token>,
@@ -92,32 +127,26 @@ pub fn serve_page(
     announce: impl FnOnce(&Announcement),
     shutdown: &Shutdown,
 ) -> io::Result<()> {
-    let listener = std::net::TcpListener::bind(address)?;
-    listener.set_nonblocking(true)?;
-    let address = listener.local_addr()?;
-    let token = match token {
-        None if !address.ip().is_loopback() => Some(Token::random()?),
-        given => given,
+    let server = PageServer {
+        address,
+        token,
+        names,
+        open_paths: open_paths.to_vec(),
+        limits: ConnectionLimits::default(),
+        threads: |_| {},
     };
-    let announcement = Announcement::new(address, &names, token.as_ref());
-    let policy = AccessPolicy::new(address.port(), token, names, open_paths.to_vec());
-    let router = router(Arc::new(policy));
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(PAGE_THREADS)
-        .thread_name("relit-http")
-        .enable_io()
-        .enable_time()
-        .build()?;
-    let served = runtime.block_on(async {
-        let listener = TcpListener::from_std(listener)?;
-        announce(&announcement);
-        let limits = ConnectionLimits::default();
-        let connections = Arc::new(Semaphore::new(limits.connections));
-        run(listener, router, limits, &connections, shutdown).await;
-        Ok(())
-    });
-    runtime.shutdown_timeout(GRACE);
-    served
+    server.serve(router, announce, shutdown)
+}
+
+/// Takes connections until `shutdown` is cancelled.
+async fn run(listener: TcpListener, router: Router, limits: ConnectionLimits, shutdown: &Shutdown) {
+    // Each connection holds a permit while it is open.
+    let connections = Arc::new(Semaphore::new(limits.connections));
+    let accepting = accept(listener, router, limits, &connections, shutdown);
+    shutdown.run_until_cancelled(accepting).await;
+    let all = u32::try_from(limits.connections).unwrap_or(u32::MAX);
+    // Who is not ready by then is cut off.
+    let _ = timeout(GRACE, connections.acquire_many(all)).await;
 }
 
 /// Connections by address: one client cannot take all of them.

@@ -209,8 +209,8 @@ impl ManualPlan {
         let mut values = Vec::new();
         for aspect in &ASPECTS {
             let before = plan.not_held.locked.len();
-            let switched = plan.switch_off(controls, aspect);
-            let held = plan.hold(controls, wanted, aspect, &mut values);
+            let (switched, is_manual) = plan.switch_off(controls, aspect);
+            let held = plan.hold(controls, wanted, aspect, &mut values) || is_manual;
             let is_locked = plan.not_held.locked.len() > before;
             let has_automatic = switched && !aspect.values.is_empty();
             if (aspect.is_needed || has_automatic) && !held && !is_locked {
@@ -247,9 +247,10 @@ impl ManualPlan {
             .collect()
     }
 
-    /// Plans the switches of an aspect; true if there is one that can be set.
-    fn switch_off(&mut self, controls: &[Control], aspect: &Aspect) -> bool {
-        let mut switched = false;
+    /// Plans the switches of an aspect: whether there is one that can be set, and whether there is one that is manual
+    /// for good.
+    fn switch_off(&mut self, controls: &[Control], aspect: &Aspect) -> (bool, bool) {
+        let (mut switched, mut is_manual) = (false, false);
         for &(name, manual) in aspect.switches {
             let Some(control) = find(controls, name) else {
                 continue;
@@ -259,13 +260,18 @@ impl ManualPlan {
                     self.steps.push(step(aspect, control, value));
                     switched = true;
                 }
+                manual
+                    if control.flags.read_only && manual.is_some() && control.value == manual =>
+                {
+                    is_manual = true;
+                }
                 _ => self.not_held.locked.push(name.to_owned()),
             }
         }
-        switched
+        (switched, is_manual)
     }
 
-    /// Plans the values of an aspect; true if there is one that can be set.
+    /// Plans the values of an aspect; true if there is one that can be set, or that cannot be another.
     fn hold(
         &mut self,
         controls: &[Control],
@@ -278,6 +284,10 @@ impl ManualPlan {
             let Some(control) = names.iter().find_map(|name| find(controls, name)) else {
                 continue;
             };
+            if control.flags.read_only && control.minimum == control.maximum {
+                held = true;
+                continue;
+            }
             if !may_be_set(control) {
                 self.not_held.locked.push(control.name.clone());
                 continue;

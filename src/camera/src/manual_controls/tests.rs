@@ -241,6 +241,25 @@ fn a_read_only_value_is_named_and_an_automatic_without_value_too() {
 }
 
 #[test]
+fn what_is_manual_for_good_needs_no_setting() {
+    let mut controls = vec![
+        menu("auto_exposure", &[(0, "Manual Mode")], 0),
+        number("exposure_time_absolute", (156, 156), 156),
+        number("gain", (7, 7), 7),
+        number("white_balance_automatic", (0, 0), 0),
+    ];
+    for control in &mut controls {
+        control.flags.read_only = true;
+    }
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
+    assert_eq!(plan, ManualPlan::default());
+    controls[0] = menu("auto_exposure", &[(0, "Aperture Priority Mode")], 0);
+    controls[0].flags.read_only = true;
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
+    assert_eq!(plan.not_held.locked, ["auto_exposure"]);
+}
+
+#[test]
 fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
     let before = c920_new();
     let plan = ManualPlan::new(&before, &ManualValues::default());

@@ -11,27 +11,9 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::capture::{StopReason, StopRequest};
-use crate::command::CommandError;
+use crate::command::{Command, CommandError};
 use crate::state::{Monitor, Phase};
 use relit_data::clock::Clock;
-
-/// Something for the rig to do.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Job {
-    /// One turn of an object.
-    Capture(String),
-    /// Whatever the table does.
-    StopTable,
-    Home,
-    /// By degrees.
-    Jog(f64),
-    /// Resets, unlocks and homes the table.
-    ResetTable,
-    SetControl {
-        name: String,
-        value: i64,
-    },
-}
 
 /// What the worker does now.
 #[derive(Debug, Clone)]
@@ -39,7 +21,7 @@ pub(super) enum Next {
     /// Nothing is to be done.
     Idle,
     /// This job, until its stop is requested.
-    Job(Job, StopRequest),
+    Job(Command, StopRequest),
     /// No more jobs come.
     End,
 }
@@ -54,7 +36,7 @@ pub(super) struct Dispatcher {
 
 #[derive(Debug)]
 struct Plan {
-    current: Option<Job>,
+    current: Option<Command>,
     is_running: bool,
     is_ending: bool,
     /// The stop of the job under way: each job has its own.
@@ -81,7 +63,7 @@ impl Dispatcher {
     }
 
     /// Makes this the job, unless one is running.
-    pub(super) fn submit(&self, job: Job) -> Result<(), CommandError> {
+    pub(super) fn submit(&self, job: Command) -> Result<(), CommandError> {
         let mut plan = self.lock();
         if plan.is_ending {
             let ending = "the program is ending: start it again";
@@ -100,9 +82,9 @@ impl Dispatcher {
         let mut plan = self.lock();
         match &plan.current {
             _ if plan.is_ending => {}
-            Some(Job::StopTable) if plan.is_running => {}
+            Some(Command::Stop) if plan.is_running => {}
             Some(_) if plan.is_running => plan.stop.request(StopReason::Person),
-            _ => plan.current = Some(Job::StopTable),
+            _ => plan.current = Some(Command::Stop),
         }
     }
 
@@ -148,9 +130,9 @@ impl Dispatcher {
     }
 }
 
-fn under_way(job: &Job) -> String {
+fn under_way(job: &Command) -> String {
     match job {
-        Job::Capture(object) => format!("{object} is being captured: wait for it, or stop it"),
+        Command::Start { object } => format!("{object} is being captured: wait for it, or stop it"),
         _ => "the table or the camera is being set: wait a moment".to_owned(),
     }
 }
@@ -165,7 +147,12 @@ mod tests {
         Dispatcher::new(Clock::monotonic())
     }
 
-    fn begun(dispatcher: &Dispatcher) -> (Job, StopRequest) {
+    fn start() -> Command {
+        let object = "mug".to_owned();
+        Command::Start { object }
+    }
+
+    fn begun(dispatcher: &Dispatcher) -> (Command, StopRequest) {
         match dispatcher.begin() {
             Next::Job(job, stop) => (job, stop),
             other => panic!("{other:?}"),
@@ -176,61 +163,61 @@ mod tests {
     fn one_job_is_taken_at_a_time_and_begins_once() {
         let dispatcher = dispatcher();
         assert!(matches!(dispatcher.begin(), Next::Idle));
-        dispatcher.submit(Job::Capture("mug".to_owned())).unwrap();
-        let refused = dispatcher.submit(Job::Home).unwrap_err();
+        dispatcher.submit(start()).unwrap();
+        let refused = dispatcher.submit(Command::Home).unwrap_err();
         assert!(
             matches!(&refused, CommandError::Busy(why) if why.contains("mug")),
             "{refused}"
         );
-        assert_eq!(begun(&dispatcher).0, Job::Capture("mug".to_owned()));
+        assert_eq!(begun(&dispatcher).0, start());
         assert!(matches!(dispatcher.begin(), Next::Idle));
         assert!(matches!(
-            dispatcher.submit(Job::Home),
+            dispatcher.submit(Command::Home),
             Err(CommandError::Busy(_))
         ));
         dispatcher.finish();
-        dispatcher.submit(Job::Home).unwrap();
-        assert_eq!(begun(&dispatcher).0, Job::Home);
+        dispatcher.submit(Command::Home).unwrap();
+        assert_eq!(begun(&dispatcher).0, Command::Home);
     }
 
     #[test]
     fn a_stop_reaches_the_job_under_way_and_no_later_one() {
         let dispatcher = dispatcher();
-        dispatcher.submit(Job::Home).unwrap();
+        dispatcher.submit(Command::Home).unwrap();
         let (_, stop) = begun(&dispatcher);
         dispatcher.stop();
         assert_eq!(stop.reason(), Some(StopReason::Person));
         dispatcher.finish();
-        dispatcher.submit(Job::Home).unwrap();
+        dispatcher.submit(Command::Home).unwrap();
         assert_eq!(begun(&dispatcher).1.reason(), None);
     }
 
     #[test]
     fn a_stop_before_a_job_begins_takes_its_place_and_a_free_rig_stops_its_table() {
         let dispatcher = dispatcher();
-        dispatcher.submit(Job::Capture("mug".to_owned())).unwrap();
+        dispatcher.submit(start()).unwrap();
         dispatcher.stop();
         let (job, stop) = begun(&dispatcher);
-        assert_eq!(job, Job::StopTable);
+        assert_eq!(job, Command::Stop);
         // It is not stopped itself.
         dispatcher.stop();
         assert_eq!(stop.reason(), None);
         dispatcher.finish();
         dispatcher.stop();
-        assert_eq!(begun(&dispatcher).0, Job::StopTable);
+        assert_eq!(begun(&dispatcher).0, Command::Stop);
     }
 
     #[test]
     fn after_the_end_nothing_begins() {
         let dispatcher = dispatcher();
-        dispatcher.submit(Job::Home).unwrap();
+        dispatcher.submit(Command::Home).unwrap();
         let (_, stop) = begun(&dispatcher);
         dispatcher.stop();
         dispatcher.end();
         assert_eq!(stop.reason(), Some(StopReason::Shutdown));
         dispatcher.finish();
         assert!(matches!(
-            dispatcher.submit(Job::Home),
+            dispatcher.submit(Command::Home),
             Err(CommandError::Unavailable(_))
         ));
         dispatcher.stop();

@@ -18,7 +18,7 @@ use crate::capture::{CaptureError, Equipment, Settings, preflight, recover};
 use crate::command::{Command, CommandError, Rig};
 use crate::preview::Preview;
 use crate::state::{Monitor, RigState};
-use dispatcher::{Dispatcher, Job};
+use dispatcher::Dispatcher;
 use relit_data::clock::{Clock, JoinHandle};
 use relit_turntable::lockfile::LockFile;
 use relit_turntable::simulator::SimulatedTable;
@@ -103,17 +103,11 @@ impl Rig for Daemon {
         }
         command.check(&dispatcher.monitor().state())?;
         match command {
-            Command::Start { object } => dispatcher.submit(Job::Capture(object)),
             Command::Stop => {
                 dispatcher.stop();
                 Ok(())
             }
-            Command::Home => dispatcher.submit(Job::Home),
-            Command::Jog { degrees } => dispatcher.submit(Job::Jog(degrees)),
-            Command::Reset => dispatcher.submit(Job::ResetTable),
-            Command::SetControl { name, value } => {
-                dispatcher.submit(Job::SetControl { name, value })
-            }
+            command => dispatcher.submit(command),
         }
     }
 
@@ -197,7 +191,7 @@ mod tests {
         assert!(worker.unwrap().join().is_err());
         let faults = dispatcher.monitor().state().faults;
         assert_eq!(faults.len(), 1, "{faults:?}");
-        let refused = dispatcher.submit(Job::Home);
+        let refused = dispatcher.submit(Command::Home);
         assert!(matches!(refused, Err(CommandError::Unavailable(_))));
     }
 }

@@ -6,11 +6,12 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
-use super::dispatcher::{Dispatcher, Job, Next};
+use super::dispatcher::{Dispatcher, Next};
 use super::idle::Idle;
 use crate::capture::preflight::ZERO_TAKEN;
 use crate::capture::turn::show_table;
 use crate::capture::{CaptureContext, CaptureError, Equipment, StopRequest, capture};
+use crate::command::Command;
 use crate::preview::Preview;
 use relit_camera::Camera;
 use relit_camera::manual_controls::{ManualPlan, ManualValues};
@@ -49,7 +50,7 @@ impl Worker {
         }
     }
 
-    fn work(&mut self, job: Job, stop: &StopRequest) {
+    fn work(&mut self, job: Command, stop: &StopRequest) {
         match self.do_job(job, stop) {
             Ok(()) => {}
             // Whoever stopped it knows: that is no fault.
@@ -60,23 +61,23 @@ impl Worker {
         self.dispatcher.finish();
     }
 
-    fn do_job(&mut self, job: Job, stop: &StopRequest) -> Result<(), CaptureError> {
+    fn do_job(&mut self, job: Command, stop: &StopRequest) -> Result<(), CaptureError> {
         match job {
-            Job::Capture(object) => self.capture(&object, stop),
-            Job::StopTable if !self.equipment.wants_table() => Ok(()),
-            Job::StopTable => self.with_table(stop, Table::stop).map(drop),
-            Job::Home => self.with_table(stop, Table::home).map(drop),
-            Job::Jog(degrees) => {
+            Command::Start { object } => self.capture(&object, stop),
+            Command::Stop if !self.equipment.wants_table() => Ok(()),
+            Command::Stop => self.with_table(stop, Table::stop).map(drop),
+            Command::Home => self.with_table(stop, Table::home).map(drop),
+            Command::Jog { degrees } => {
                 let jog = |table: &Table| table.jog(degrees, None);
                 self.with_table(stop, jog).map(drop)
             }
-            Job::ResetTable => {
+            Command::Reset => {
                 if self.with_table(stop, Table::reset)? == HomingResult::WhereItStands {
                     self.report(ZERO_TAKEN.to_owned());
                 }
                 Ok(())
             }
-            Job::SetControl { name, value } => self.set_control(&name, value),
+            Command::SetControl { name, value } => self.set_control(&name, value),
         }
     }
 

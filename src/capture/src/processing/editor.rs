@@ -31,6 +31,17 @@ pub(crate) struct EditorTarget {
     pub token: String,
 }
 
+impl EditorTarget {
+    /// Of what the editor says of itself.
+    pub(super) fn parse(address: &str, url: &str) -> Option<Self> {
+        let (_, token) = url.split_once("?token=")?;
+        Some(Self {
+            address: address.parse().ok()?,
+            token: token.to_owned(),
+        })
+    }
+}
+
 /// An editor that is open.
 #[derive(Debug)]
 pub(super) struct OpenEditor {
@@ -62,10 +73,10 @@ impl OpenEditor {
         loop {
             worker.set_paused(is_busy(&shared.monitor));
             worker.read_events(&mut heard);
-            if let Some(target) = target(&heard) {
+            if let Some(target) = heard.editor() {
                 return Ok(Self {
                     session: session.to_owned(),
-                    target,
+                    target: target.clone(),
                     worker,
                     heard,
                     used: Instant::now(),
@@ -105,15 +116,6 @@ impl OpenEditor {
     pub(super) fn masked_session(&self) -> Option<&str> {
         self.heard.has_mask().then_some(&*self.session)
     }
-}
-
-fn target(heard: &ProgramEvent) -> Option<EditorTarget> {
-    let place = heard.editor()?;
-    let (_, token) = place.url.split_once("?token=")?;
-    Some(EditorTarget {
-        address: place.address.parse().ok()?,
-        token: token.to_owned(),
-    })
 }
 
 /// How the mask was made, where the editor can go on with that.

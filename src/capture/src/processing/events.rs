@@ -3,11 +3,9 @@
 use relit_console::{Check, Event};
 use serde::Deserialize;
 
+use super::editor::EditorTarget;
 use super::queue::StepOutcome;
 use crate::state::{ProcessingOutcome, ProcessingStep};
-
-/// Warnings and reasons that are kept.
-const KEPT: usize = 8;
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
@@ -32,48 +30,20 @@ struct Quality {
     reasons: Vec<String>,
 }
 
-/// A session that was not extracted again, because the data set holds it.
-#[derive(Debug, Clone, Copy)]
-struct SkippedSession {
-    lossy: bool,
-    misfit: bool,
-    broken: bool,
-}
-
-impl SkippedSession {
-    /// What a person should know of it.
-    fn fault(self) -> Option<&'static str> {
-        if self.misfit {
-            Some("its mask does not fit")
-        } else if self.broken {
-            Some("it is broken")
-        } else if self.lossy {
-            Some("parts of it are lost")
-        } else {
-            None
-        }
-    }
-}
-
-/// Where the editor of masks is, as it says itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct EditorPlace {
-    pub(super) address: String,
-    pub(super) url: String,
-}
-
 /// All that a program reported.
 #[derive(Debug, Default)]
 pub(super) struct ProgramEvent {
     progress: Option<(u64, u64)>,
+    /// Its error; without one, why it left the session out.
     error: Option<String>,
-    warnings: Vec<String>,
+    /// The first one.
+    warning: Option<String>,
     check: Option<CheckReport>,
     extracted: Option<ExtractedSession>,
-    skipped: Option<SkippedSession>,
-    left_out: Option<String>,
+    /// Set where the data set holds the session already.
+    skipped: Option<StepOutcome>,
     has_mask: bool,
-    editor: Option<EditorPlace>,
+    editor: Option<EditorTarget>,
 }
 
 impl ProgramEvent {
@@ -85,7 +55,9 @@ impl ProgramEvent {
         match event {
             Event::Progress { done, of, .. } => self.progress = Some((done, of)),
             Event::Error { message, .. } => self.error = Some(message),
-            Event::Warning { message, .. } => keep(&mut self.warnings, message),
+            Event::Warning { message, .. } => {
+                self.warning.get_or_insert(message);
+            }
             Event::Mask { .. } => self.has_mask = true,
             Event::Check(Check::Mask { report, .. }) => {
                 self.check = serde_json::from_value(report).ok();
@@ -96,15 +68,11 @@ impl ProgramEvent {
                 misfit,
                 broken,
                 ..
-            } => {
-                self.skipped = Some(SkippedSession {
-                    lossy,
-                    misfit,
-                    broken,
-                });
+            } => self.skipped = Some(skipped(lossy, misfit, broken)),
+            Event::LeftOut { message, .. } => {
+                self.error.get_or_insert(message);
             }
-            Event::LeftOut { message, .. } => self.left_out = Some(message),
-            Event::Editor { address, url } => self.editor = Some(EditorPlace { address, url }),
+            Event::Editor { address, url } => self.editor = EditorTarget::parse(&address, &url),
             _ => {}
         }
     }
@@ -115,7 +83,7 @@ impl ProgramEvent {
     }
 
     /// Where the editor is, once it has said so.
-    pub(super) fn editor(&self) -> Option<&EditorPlace> {
+    pub(super) fn editor(&self) -> Option<&EditorTarget> {
         self.editor.as_ref()
     }
 
@@ -126,16 +94,18 @@ impl ProgramEvent {
 
     /// What went wrong, for a person; `error_output` is what the program wrote on standard error.
     pub(super) fn failure(&self, exit_code: Option<i32>, error_output: &str) -> String {
-        let said = self.error.clone().or_else(|| self.left_out.clone());
         let last = || {
             let mut lines = error_output.lines().map(str::trim);
             let last = lines.rfind(|line| !line.is_empty())?;
             Some(last.strip_prefix("error: ").unwrap_or(last).to_owned())
         };
-        said.or_else(last).unwrap_or_else(|| match exit_code {
-            Some(code) => format!("the program ended with exit code {code}, without a message"),
-            None => "the program was ended by a signal: check the machine's memory".to_owned(),
-        })
+        self.error
+            .clone()
+            .or_else(last)
+            .unwrap_or_else(|| match exit_code {
+                Some(code) => format!("the program ended with exit code {code}, without a message"),
+                None => "the program was ended by a signal: check the machine's memory".to_owned(),
+            })
     }
 
     /// How a step ended whose program had this exit code; `None` if a signal ended it.
@@ -160,19 +130,15 @@ impl ProgramEvent {
 
     /// Doubts of relit-mask about its own mask count too.
     fn masked(&self) -> StepOutcome {
-        match self.warnings.first() {
+        match &self.warning {
             None => good("the mask is made"),
             Some(warning) => doubtful(warning, true),
         }
     }
 
     fn extracted(&mut self, code: i32) -> Option<StepOutcome> {
-        if let Some(skipped) = self.skipped {
-            let Some(fault) = skipped.fault() else {
-                return Some(good("it is in the data set already"));
-            };
-            let what = format!("it is in the data set already; {fault}: see its report");
-            return Some(doubtful(&what, true));
+        if let Some(skipped) = self.skipped.take() {
+            return Some(skipped);
         }
         let session = self.extracted.take()?;
         let quality = session.quality.unwrap_or_default();
@@ -186,6 +152,21 @@ impl ProgramEvent {
         let what = format!("{samples} samples, {verdict}: {}", why.join("; "));
         Some(doubtful(&what, true))
     }
+}
+
+/// A session that was not extracted again.
+fn skipped(lossy: bool, misfit: bool, broken: bool) -> StepOutcome {
+    let fault = if misfit {
+        "its mask does not fit"
+    } else if broken {
+        "it is broken"
+    } else if lossy {
+        "parts of it are lost"
+    } else {
+        return good("it is in the data set already");
+    };
+    let what = format!("it is in the data set already; {fault}: see its report");
+    doubtful(&what, true)
 }
 
 fn checked(report: CheckReport) -> StepOutcome {
@@ -209,12 +190,6 @@ fn doubtful(what: &str, goes_on: bool) -> StepOutcome {
         outcome: ProcessingOutcome::Doubtful,
         what: what.to_owned(),
         goes_on,
-    }
-}
-
-fn keep(list: &mut Vec<String>, text: String) {
-    if list.len() < KEPT {
-        list.push(text);
     }
 }
 

@@ -29,7 +29,7 @@ pub use shared::ProcessingOptions;
 use crate::command::CommandError;
 use crate::state::{Monitor, ProcessingStep};
 use editor::OpenEditor;
-use queue::{PendingWork, ProcessingQueue};
+use queue::ProcessingQueue;
 use shared::{HELD, Plan, Shared, is_busy};
 pub(crate) use store::ProcessingSettings;
 
@@ -123,7 +123,7 @@ impl Processing {
     ///
     /// # Errors
     /// [`CommandError`] if a program is missing, or the session is being worked on.
-    pub fn submit(&self, session: &str, steps: Vec<ProcessingStep>) -> Result<u64, CommandError> {
+    pub fn submit(&self, session: &str, steps: &[ProcessingStep]) -> Result<u64, CommandError> {
         if self.shared.editor().as_ref().is_some_and(|open| {
             open.session == session && open.is_in_use() && steps.contains(&ProcessingStep::Mask)
         }) {
@@ -131,10 +131,7 @@ impl Processing {
             return Err(CommandError::Busy(error));
         }
         self.shared.find_programs();
-        self.shared.submit(PendingWork {
-            session: session.to_owned(),
-            steps,
-        })
+        self.shared.submit(session, steps)
     }
 
     /// Cancels a job; its program is ended. False if no job has that number.

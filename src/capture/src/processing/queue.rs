@@ -22,14 +22,6 @@ const CANCELLED: &str = "cancelled by a person";
 /// Ended jobs that are remembered.
 const REMEMBERED: usize = 30;
 
-/// A session and what is still to be done with it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct PendingWork {
-    pub(super) session: String,
-    /// At least one.
-    pub(super) steps: Vec<ProcessingStep>,
-}
-
 /// How a step ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct StepOutcome {
@@ -40,48 +32,30 @@ pub(super) struct StepOutcome {
     pub(super) goes_on: bool,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Entry {
-    number: u64,
-    work: PendingWork,
-}
-
-#[derive(Debug)]
-struct UnderWay {
-    entry: Entry,
-    step: ProcessingStep,
-    done: u64,
-    of: u64,
-    is_cancelled: bool,
-}
-
-/// What the runner begins.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct StartedStep {
-    pub(super) session: String,
-    pub(super) step: ProcessingStep,
-}
-
 /// Queue and job under way.
 #[derive(Debug, Default)]
 pub(super) struct ProcessingQueue {
-    waiting: VecDeque<Entry>,
-    current: Option<UnderWay>,
+    waiting: VecDeque<ProcessingJob>,
+    current: Option<ProcessingJob>,
     finished: VecDeque<FinishedJob>,
     is_rig_busy: bool,
     numbers: u64,
 }
 
 impl ProcessingQueue {
-    /// Appends work; returns its number.
-    pub(super) fn submit(&mut self, work: PendingWork) -> Result<u64, CommandError> {
-        if work.steps.is_empty() {
+    /// Appends steps of a session; returns their number.
+    pub(super) fn submit(
+        &mut self,
+        session: &str,
+        steps: &[ProcessingStep],
+    ) -> Result<u64, CommandError> {
+        let Some((&step, then)) = steps.split_first() else {
             let none = "no step is named: name mask, check or extract";
             return Err(CommandError::Invalid(none.to_owned()));
-        }
-        if self.has(&work.session) {
-            let what = &work.session;
-            let already = format!("{what} is being processed already: wait for it, or cancel it");
+        };
+        if self.has(session) {
+            let already =
+                format!("{session} is being processed already: wait for it, or cancel it");
             return Err(CommandError::Busy(already));
         }
         if self.waiting.len() >= MAX_WAITING {
@@ -89,45 +63,48 @@ impl ProcessingQueue {
             return Err(CommandError::Busy(full));
         }
         self.numbers += 1;
-        self.waiting.push_back(Entry {
+        self.waiting.push_back(ProcessingJob {
             number: self.numbers,
-            work,
+            session: session.to_owned(),
+            step,
+            then: then.to_vec(),
+            status: ProcessingStatus::Waiting,
+            done: 0,
+            of: 0,
         });
         Ok(self.numbers)
     }
 
+    /// What is under way and what waits, in that order.
+    pub(super) fn jobs(&self) -> impl Iterator<Item = &ProcessingJob> {
+        self.current.iter().chain(&self.waiting)
+    }
+
     /// Whether something of this session waits or is under way.
     pub(super) fn has(&self, session: &str) -> bool {
-        let current = self.current.iter().map(|current| &current.entry);
-        let mut all = self.waiting.iter().chain(current);
-        all.any(|entry| entry.work.session == session)
+        self.jobs().any(|job| job.session == session)
     }
 
     /// Takes a job out, or has its program ended. False if no job has that number.
     pub(super) fn cancel(&mut self, number: u64) -> bool {
         if let Some(current) = &mut self.current
-            && current.entry.number == number
+            && current.number == number
         {
-            current.is_cancelled = true;
+            current.status = ProcessingStatus::Ending;
             return true;
         }
-        let Some(at) = self.waiting.iter().position(|entry| entry.number == number) else {
+        let at = self.waiting.iter().position(|job| job.number == number);
+        let Some(job) = at.and_then(|at| self.waiting.remove(at)) else {
             return false;
         };
-        if let Some(entry) = self.waiting.remove(at)
-            && let Some(&step) = entry.work.steps.first()
-        {
-            self.remember(entry, step, ProcessingOutcome::Cancelled, CANCELLED);
-        }
+        self.remember(&job, ProcessingOutcome::Cancelled, CANCELLED);
         true
     }
 
     /// Cancels all of a session.
     pub(super) fn cancel_session(&mut self, session: &str) {
-        let current = self.current.iter().map(|current| &current.entry);
-        let of_session = self.waiting.iter().chain(current);
-        let of_session = of_session.filter(|entry| entry.work.session == session);
-        let numbers: Vec<u64> = of_session.map(|entry| entry.number).collect();
+        let of_session = self.jobs().filter(|job| job.session == session);
+        let numbers: Vec<u64> = of_session.map(|job| job.number).collect();
         for number in numbers {
             self.cancel(number);
         }
@@ -136,35 +113,41 @@ impl ProcessingQueue {
     /// The rig captures or moves, or rests.
     pub(super) fn set_rig_busy(&mut self, is_busy: bool) {
         self.is_rig_busy = is_busy;
+        if let Some(current) = &mut self.current
+            && current.status != ProcessingStatus::Ending
+        {
+            current.status = if is_busy {
+                ProcessingStatus::Held
+            } else {
+                ProcessingStatus::Running
+            };
+        }
     }
 
     /// What begins now, if anything does.
-    pub(super) fn begin(&mut self) -> Option<StartedStep> {
+    pub(super) fn begin(&mut self) -> Option<ProcessingJob> {
         if self.is_rig_busy || self.current.is_some() {
             return None;
         }
-        let entry = self.waiting.pop_front()?;
-        let step = *entry.work.steps.first()?;
-        let session = entry.work.session.clone();
-        self.current = Some(UnderWay {
-            entry,
-            step,
-            done: 0,
-            of: 0,
-            is_cancelled: false,
-        });
-        Some(StartedStep { session, step })
+        let mut job = self.waiting.pop_front()?;
+        job.status = ProcessingStatus::Running;
+        self.current = Some(job.clone());
+        Some(job)
     }
 
     /// Whether the program under way is to be held.
     pub(super) fn should_pause(&self) -> bool {
-        self.is_rig_busy && self.current.is_some() && !self.is_cancelled()
+        self.is_current(ProcessingStatus::Held)
     }
 
     /// Whether the program under way is to end.
     pub(super) fn is_cancelled(&self) -> bool {
+        self.is_current(ProcessingStatus::Ending)
+    }
+
+    fn is_current(&self, status: ProcessingStatus) -> bool {
         let current = self.current.as_ref();
-        current.is_some_and(|current| current.is_cancelled)
+        current.is_some_and(|current| current.status == status)
     }
 
     /// The program under way has come so far.
@@ -176,15 +159,10 @@ impl ProcessingQueue {
 
     /// The step under way has ended; returns how, as it is shown.
     pub(super) fn finish(&mut self, end: StepOutcome) -> String {
-        let Some(UnderWay {
-            mut entry,
-            step,
-            is_cancelled,
-            ..
-        }) = self.current.take()
-        else {
+        let Some(mut job) = self.current.take() else {
             return end.what;
         };
+        let is_cancelled = job.status == ProcessingStatus::Ending;
         // What was done before the cancel arrived is done.
         let stopped = is_cancelled && end.outcome == ProcessingOutcome::Failed;
         let (outcome, what) = if stopped {
@@ -192,10 +170,12 @@ impl ProcessingQueue {
         } else {
             (end.outcome, end.what)
         };
-        self.remember(entry.clone(), step, outcome, &what);
-        entry.work.steps.remove(0);
-        if end.goes_on && !is_cancelled && !entry.work.steps.is_empty() {
-            self.waiting.push_front(entry);
+        self.remember(&job, outcome, &what);
+        if end.goes_on && !is_cancelled && !job.then.is_empty() {
+            job.step = job.then.remove(0);
+            job.status = ProcessingStatus::Waiting;
+            (job.done, job.of) = (0, 0);
+            self.waiting.push_front(job);
         }
         what
     }
@@ -206,45 +186,17 @@ impl ProcessingQueue {
             .retain(|job| job.session != session || job.step != ProcessingStep::Mask);
     }
 
-    fn remember(
-        &mut self,
-        entry: Entry,
-        step: ProcessingStep,
-        outcome: ProcessingOutcome,
-        what: &str,
-    ) {
+    fn remember(&mut self, job: &ProcessingJob, outcome: ProcessingOutcome, what: &str) {
         if self.finished.len() == REMEMBERED {
             self.finished.pop_front();
         }
         self.finished.push_back(FinishedJob {
-            number: entry.number,
-            session: entry.work.session,
-            step,
+            number: job.number,
+            session: job.session.clone(),
+            step: job.step,
             outcome,
             what: what.to_owned(),
         });
-    }
-
-    /// What is under way and what waits, as it is shown.
-    pub(super) fn jobs(&self) -> Vec<ProcessingJob> {
-        let waiting = self.waiting.iter().filter_map(|entry| {
-            let (&step, then) = entry.work.steps.split_first()?;
-            Some(shown(entry, step, then, ProcessingStatus::Waiting))
-        });
-        let current = self.current.iter().map(|current| {
-            let status = match (current.is_cancelled, self.is_rig_busy) {
-                (true, _) => ProcessingStatus::Ending,
-                (false, true) => ProcessingStatus::Held,
-                (false, false) => ProcessingStatus::Running,
-            };
-            let then = current.entry.work.steps.get(1..).unwrap_or_default();
-            ProcessingJob {
-                done: current.done,
-                of: current.of,
-                ..shown(&current.entry, current.step, then, status)
-            }
-        });
-        current.chain(waiting).collect()
     }
 
     /// The jobs that ended last, newest last.
@@ -253,34 +205,10 @@ impl ProcessingQueue {
     }
 }
 
-fn shown(
-    entry: &Entry,
-    step: ProcessingStep,
-    then: &[ProcessingStep],
-    status: ProcessingStatus,
-) -> ProcessingJob {
-    ProcessingJob {
-        number: entry.number,
-        session: entry.work.session.clone(),
-        step,
-        then: then.to_vec(),
-        status,
-        done: 0,
-        of: 0,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::ProcessingStep::{Check, Extract, Mask};
     use super::*;
-
-    fn work(session: &str, steps: &[ProcessingStep]) -> PendingWork {
-        PendingWork {
-            session: session.to_owned(),
-            steps: steps.to_vec(),
-        }
-    }
 
     fn end(outcome: ProcessingOutcome, goes_on: bool) -> StepOutcome {
         StepOutcome {
@@ -300,8 +228,8 @@ mod tests {
     #[test]
     fn the_steps_of_a_session_follow_each_other_before_another_session_begins() {
         let mut queue = ProcessingQueue::default();
-        queue.submit(work("mug", &[Mask, Check, Extract])).unwrap();
-        queue.submit(work("cow", &[Mask])).unwrap();
+        queue.submit("mug", &[Mask, Check, Extract]).unwrap();
+        queue.submit("cow", &[Mask]).unwrap();
         for wanted in [
             ("mug", Mask),
             ("mug", Check),
@@ -320,8 +248,8 @@ mod tests {
     #[test]
     fn a_step_that_a_person_has_to_look_at_ends_those_of_its_session_only() {
         let mut queue = ProcessingQueue::default();
-        queue.submit(work("mug", &[Check, Extract])).unwrap();
-        queue.submit(work("cow", &[Mask])).unwrap();
+        queue.submit("mug", &[Check, Extract]).unwrap();
+        queue.submit("cow", &[Mask]).unwrap();
         begun(&mut queue).unwrap();
         queue.finish(end(ProcessingOutcome::Doubtful, false));
         assert_eq!(begun(&mut queue), Some(("cow".to_owned(), Mask)));
@@ -331,7 +259,7 @@ mod tests {
     fn nothing_begins_while_the_rig_is_busy_and_what_is_under_way_is_held() {
         let mut queue = ProcessingQueue::default();
         queue.set_rig_busy(true);
-        queue.submit(work("mug", &[Mask, Check])).unwrap();
+        queue.submit("mug", &[Mask, Check]).unwrap();
         assert_eq!(begun(&mut queue), None);
         assert!(!queue.should_pause(), "there is nothing to hold");
         queue.set_rig_busy(false);
@@ -339,7 +267,7 @@ mod tests {
         assert!(!queue.should_pause());
         queue.set_rig_busy(true);
         assert!(queue.should_pause());
-        assert_eq!(queue.jobs()[0].status, ProcessingStatus::Held);
+        assert_eq!(queue.jobs().next().unwrap().status, ProcessingStatus::Held);
         // A program may end just before it is held.
         queue.finish(end(GOOD, true));
         assert_eq!(
@@ -354,8 +282,8 @@ mod tests {
     #[test]
     fn what_is_cancelled_ends_and_nothing_follows_it() {
         let mut queue = ProcessingQueue::default();
-        let mug = queue.submit(work("mug", &[Mask, Check])).unwrap();
-        let cow = queue.submit(work("cow", &[Mask])).unwrap();
+        let mug = queue.submit("mug", &[Mask, Check]).unwrap();
+        let cow = queue.submit("cow", &[Mask]).unwrap();
         begun(&mut queue).unwrap();
         queue.set_rig_busy(true);
         assert!(queue.cancel(mug) && queue.cancel(cow));
@@ -363,10 +291,13 @@ mod tests {
             queue.is_cancelled() && !queue.should_pause(),
             "it has to run to end"
         );
-        assert_eq!(queue.jobs().len(), 1);
-        assert_eq!(queue.jobs()[0].status, ProcessingStatus::Ending);
+        assert_eq!(queue.jobs().count(), 1);
+        assert_eq!(
+            queue.jobs().next().unwrap().status,
+            ProcessingStatus::Ending
+        );
         queue.finish(end(ProcessingOutcome::Failed, false));
-        assert!(queue.jobs().is_empty() && !queue.cancel(mug));
+        assert!(queue.jobs().next().is_none() && !queue.cancel(mug));
         let outcomes: Vec<_> = queue.finished().iter().map(|job| job.outcome).collect();
         assert_eq!(outcomes, [ProcessingOutcome::Cancelled; 2]);
     }
@@ -374,7 +305,7 @@ mod tests {
     #[test]
     fn a_step_that_was_done_before_its_cancel_arrived_counts_as_done() {
         let mut queue = ProcessingQueue::default();
-        let number = queue.submit(work("mug", &[Mask, Check])).unwrap();
+        let number = queue.submit("mug", &[Mask, Check]).unwrap();
         begun(&mut queue).unwrap();
         queue.cancel(number);
         queue.finish(end(GOOD, true));
@@ -385,32 +316,32 @@ mod tests {
     #[test]
     fn a_session_is_queued_once_and_again_after_its_end() {
         let mut queue = ProcessingQueue::default();
-        queue.submit(work("mug", &[Mask])).unwrap();
-        let again = queue.submit(work("mug", &[Check])).unwrap_err();
+        queue.submit("mug", &[Mask]).unwrap();
+        let again = queue.submit("mug", &[Check]).unwrap_err();
         assert!(
             matches!(&again, CommandError::Busy(why) if why.contains("mug")),
             "{again}"
         );
         begun(&mut queue).unwrap();
-        assert!(queue.submit(work("mug", &[Check])).is_err());
+        assert!(queue.submit("mug", &[Check]).is_err());
         queue.finish(end(GOOD, true));
-        queue.submit(work("mug", &[Check])).unwrap();
-        let nothing = queue.submit(work("cow", &[]));
+        queue.submit("mug", &[Check]).unwrap();
+        let nothing = queue.submit("cow", &[]);
         assert!(
             matches!(nothing, Err(CommandError::Invalid(_))),
             "{nothing:?}"
         );
         queue.cancel_session("mug");
-        assert!(queue.jobs().is_empty());
+        assert!(queue.jobs().next().is_none());
     }
 
     #[test]
     fn the_queue_has_an_end() {
         let mut queue = ProcessingQueue::default();
         for n in 0..MAX_WAITING {
-            queue.submit(work(&n.to_string(), &[Mask])).unwrap();
+            queue.submit(&n.to_string(), &[Mask]).unwrap();
         }
-        let full = queue.submit(work("mug", &[Mask]));
+        let full = queue.submit("mug", &[Mask]);
         assert!(matches!(full, Err(CommandError::Busy(_))), "{full:?}");
     }
 }

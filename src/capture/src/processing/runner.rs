@@ -11,9 +11,9 @@ use super::child::Worker;
 use super::commands::StepPlaces;
 use super::editor::OpenEditor;
 use super::events::ProgramEvent;
-use super::queue::{PendingWork, StartedStep, StepOutcome};
+use super::queue::StepOutcome;
 use super::shared::{Shared, ToStart, is_busy};
-use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
+use crate::state::{Monitor, ProcessingJob, ProcessingOutcome, ProcessingStep, Verdict};
 
 /// Longest time between two looks at the program and the rig.
 const LOOK: Duration = Duration::from_millis(50);
@@ -28,7 +28,7 @@ const ALL: [ProcessingStep; 3] = [
 
 /// The step under way.
 struct Running {
-    begun: StartedStep,
+    begun: ProcessingJob,
     worker: Worker,
     heard: ProgramEvent,
 }
@@ -96,7 +96,7 @@ fn take_up_what_was_recorded(shared: &Shared, seen: &mut Option<String>) {
     };
     // Without the programs the page shows the commands.
     if !steps.is_empty()
-        && let Err(refused) = shared.submit(PendingWork { session, steps })
+        && let Err(refused) = shared.submit(&session, &steps)
     {
         shared
             .monitor
@@ -128,7 +128,7 @@ fn begin(shared: &Shared) -> Option<Running> {
     }
 }
 
-fn start(shared: &Shared, begun: &StartedStep) -> Result<Worker, String> {
+fn start(shared: &Shared, begun: &ProcessingJob) -> Result<Worker, String> {
     let session = shared.root.join(&begun.session);
     let is_aborted = is_aborted(&session).map_err(|why| format!("{}: {why}", begun.session))?;
     let (programs, dataset) = {
@@ -179,7 +179,7 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
     None
 }
 
-fn finish(shared: &Shared, begun: &StartedStep, end: StepOutcome) {
+fn finish(shared: &Shared, begun: &ProcessingJob, end: StepOutcome) {
     let what = shared.change(|plan| plan.queue.finish(end));
     let line = format!("{}: {}: {what}", begun.session, begun.step);
     shared.monitor.update(|state| state.note(line));

@@ -10,7 +10,7 @@ use std::{fmt, io};
 use super::child::Worker;
 use super::commands::ProcessingPrograms;
 use super::editor::OpenEditor;
-use super::queue::{PendingWork, ProcessingQueue};
+use super::queue::ProcessingQueue;
 use super::store::{self, ProcessingSettings};
 use crate::command::CommandError;
 use crate::state::{Monitor, ProcessingState, ProcessingStep};
@@ -125,14 +125,18 @@ impl Shared {
         }
     }
 
-    pub(super) fn submit(&self, work: PendingWork) -> Result<u64, CommandError> {
+    pub(super) fn submit(
+        &self,
+        session: &str,
+        steps: &[ProcessingStep],
+    ) -> Result<u64, CommandError> {
         self.change(|plan| {
             let missing_program = |step: &ProcessingStep| plan.missing_program(*step);
-            if let Some(program) = work.steps.iter().find_map(missing_program) {
+            if let Some(program) = steps.iter().find_map(missing_program) {
                 let error = format!("{program} is not installed on this machine: install the package relit, or copy the command");
                 return Err(CommandError::Unavailable(error));
             }
-            plan.queue.submit(work)
+            plan.queue.submit(session, steps)
         })
     }
 
@@ -168,7 +172,7 @@ impl Shared {
                 has_extract_program: plan.programs.extract.is_some(),
                 when_done: plan.settings.when_done,
                 dataset_folder: self.dataset.display().to_string(),
-                jobs: plan.queue.jobs(),
+                jobs: plan.queue.jobs().cloned().collect(),
                 finished: plan.queue.finished(),
                 editing,
             }

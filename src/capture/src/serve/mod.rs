@@ -32,43 +32,34 @@ use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 
+use relit_web::PageServer;
 use tokio::time::{MissedTickBehavior, interval};
 
 pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
 use crate::command::Rig;
 pub use relit_web::{Announcement, ListenAddress, Shutdown, Token};
 
-/// Threads that carry requests; files and decoding have their own.
-const THREADS: usize = 2;
 /// Threads for files, decoding and commands: more than all that may use them at once, so that a
 /// command to stop never waits for a thread.
 const BLOCKING_THREADS: usize = 24;
 
-/// Why the rig could not be served.
+/// The rig could not be served: the address is taken, not this machine's, or not allowed, or the system lacks threads.
 #[derive(Debug, thiserror::Error)]
-pub enum ServeError {
-    /// The address is taken, not this machine's, or not allowed.
-    #[error(
-        "cannot listen on {address}: {source}; give another address or port, or end the program that has it"
-    )]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// The system lacks something; what, and what to do.
-    #[error("{0}: {1}")]
-    System(&'static str, io::Error),
+#[error(
+    "cannot listen on {address}: {source}; give another address or port, or end the program that has it"
+)]
+pub struct ServeError {
+    address: SocketAddr,
+    source: io::Error,
 }
 
 /// Whether the address can be listened on, as things are.
 ///
 /// # Errors
-/// [`ServeError::Listen`].
+/// [`ServeError`].
 pub fn check_address(address: SocketAddr) -> Result<(), ServeError> {
     let listened = TcpListener::bind(address).map(drop);
-    listened.map_err(|source| ServeError::Listen { address, source })
+    listened.map_err(|source| ServeError { address, source })
 }
 
 /// Serves the rig until `shutdown` is cancelled; it ends within a few seconds then. `announce` is called
@@ -82,64 +73,31 @@ pub fn serve(
     shutdown: &Shutdown,
     announce: impl FnOnce(&Announcement),
 ) -> Result<(), ServeError> {
-    let asked = options.address;
-    let failed = |source| ServeError::Listen {
-        address: asked,
-        source,
+    let address = options.address;
+    let server = PageServer {
+        address,
+        token: options.token,
+        names: options.names,
+        open_paths: page::paths(),
+        limits: options.limits.connections,
+        threads: |runtime| {
+            runtime.max_blocking_threads(BLOCKING_THREADS);
+            runtime.on_thread_start(give_way);
+        },
     };
-    let listener = TcpListener::bind(asked).map_err(failed)?;
-    listener.set_nonblocking(true).map_err(failed)?;
-    let address = listener.local_addr().map_err(failed)?;
-    let token = match options.token {
-        Some(token) => Some(token),
-        None if address.ip().is_loopback() => None,
-        None => Some(Token::random().map_err(|error| {
-            ServeError::System(
-                "no random numbers for a token could be had: give a token with --token-file",
-                error,
-            )
-        })?),
+    let router = |policy| {
+        let (rig, shutdown) = (rig.clone(), shutdown.clone());
+        let app = routes::App::new(rig, policy, options.limits, shutdown, options.processing);
+        routes::router(&app)
     };
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(THREADS)
-        .max_blocking_threads(BLOCKING_THREADS)
-        .thread_name("relit-http")
-        .on_thread_start(give_way)
-        .enable_io()
-        .enable_time()
-        .build()
-        .map_err(|error| {
-            let what = "the threads of the HTTP server could not be started: close other programs";
-            ServeError::System(what, error)
-        })?;
-    let announcement = Announcement::new(address, &options.names, token.as_ref());
-    let policy = relit_web::AccessPolicy::new(address.port(), token, options.names, page::paths());
-    let app = routes::App::new(
-        rig,
-        policy,
-        options.limits,
-        shutdown.clone(),
-        options.processing,
-    );
-    let served = runtime.block_on(async {
-        let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
-        announce(&announcement);
+    let begun = |announcement: &Announcement| {
+        announce(announcement);
         if let Some(heartbeat) = options.heartbeat {
-            tokio::spawn(beat(heartbeat, app.rig.clone()));
+            tokio::spawn(beat(heartbeat, rig.clone()));
         }
-        let (limits, connections) = (app.limits.connections, &app.permits.connections);
-        relit_web::run(
-            listener,
-            routes::router(&app),
-            limits,
-            connections,
-            shutdown,
-        )
-        .await;
-        Ok(())
-    });
-    runtime.shutdown_timeout(relit_web::GRACE);
-    served
+    };
+    let served = server.serve(router, begun, shutdown);
+    served.map_err(|source| ServeError { address, source })
 }
 
 /// Beats for as long as server and rig run: that this continues means that threads run and the monitor's

@@ -20,7 +20,6 @@ const DOWNLOADS: usize = 4;
 /// Permits for what is bounded in number.
 #[derive(Debug)]
 pub(super) struct Permits {
-    pub(super) connections: Arc<Semaphore>,
     pub(super) viewers: Arc<Semaphore>,
     pub(super) subscribers: Arc<Semaphore>,
     pub(super) downloads: Arc<Semaphore>,
@@ -44,7 +43,6 @@ impl Permits {
     pub(super) fn new(limits: &ClientLimits) -> Self {
         let permits = |count| Arc::new(Semaphore::new(count));
         Self {
-            connections: permits(limits.connections.connections),
             viewers: permits(limits.viewers),
             subscribers: permits(limits.subscribers),
             downloads: permits(DOWNLOADS),

@@ -59,7 +59,7 @@ pub(super) async fn process(
     let processing = present(processing)?;
     let queued = permits.run(Work::Command, move || {
         library.ended(&id)?;
-        Ok(processing.submit(&id, steps)?)
+        Ok(processing.submit(&id, &steps)?)
     });
     let number = queued.await?;
     Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())

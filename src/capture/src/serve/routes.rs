@@ -39,7 +39,7 @@ pub(super) struct App {
 impl App {
     pub(super) fn new(
         rig: Arc<dyn Rig>,
-        policy: AccessPolicy,
+        policy: Arc<AccessPolicy>,
         limits: ClientLimits,
         shutdown: Shutdown,
         processing: ProcessingHandle,
@@ -50,7 +50,7 @@ impl App {
         let dataset = move || worker.as_ref().map_or(beside.clone(), |it| it.dataset());
         Self {
             monitor: rig.monitor().clone(),
-            policy: Arc::new(policy),
+            policy,
             limits,
             permits: Arc::new(Permits::new(&limits)),
             library: Arc::new(Library::new(root, Box::new(dataset))),

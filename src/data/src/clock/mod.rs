@@ -64,7 +64,7 @@ use std::time::Duration;
 use rustix::time::{ClockId, clock_gettime};
 
 use scheduler::Scheduler;
-pub use threads::{JoinHandle, Participant, Scope, ScopedJoinHandle};
+pub use threads::{JoinHandle, Participant, Scope};
 pub use waitable::Waitable;
 
 /// A clock in microseconds, monotonic or virtual. Clones are the same clock.

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::marker::PhantomData;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread;
 
@@ -34,12 +35,9 @@ impl Drop for Participant {
     }
 }
 
-/// A thread started by [`Clock::spawn`]. Dropping it detaches the thread.
+/// A thread started by [`Clock::spawn`] or [`Scope::spawn`]. Dropping it detaches the thread.
 #[derive(Debug)]
-pub struct JoinHandle<T> {
-    thread: thread::JoinHandle<T>,
-    ended: Arc<Waitable<bool>>,
-}
+pub struct JoinHandle<T>(Arc<Waitable<Option<thread::Result<T>>>>);
 
 impl<T> JoinHandle<T> {
     /// Waits until the thread has ended; returns its result.
@@ -48,13 +46,12 @@ impl<T> JoinHandle<T> {
     /// The panic of the thread.
     #[track_caller]
     pub fn join(self) -> thread::Result<T> {
-        self.ended.wait(|ended| ended.then_some(()));
-        self.thread.join()
+        self.0.wait(Option::take)
     }
 
     /// Whether the thread has ended.
     pub fn is_finished(&self) -> bool {
-        *self.ended.lock()
+        self.0.lock().is_some()
     }
 }
 
@@ -65,30 +62,6 @@ pub struct Scope<'scope, 'env: 'scope> {
     clock: Clock,
     /// Number of threads that have not ended.
     open: Arc<Waitable<usize>>,
-}
-
-/// A thread started by [`Scope::spawn`].
-#[derive(Debug)]
-pub struct ScopedJoinHandle<'scope, T> {
-    thread: thread::ScopedJoinHandle<'scope, T>,
-    ended: Arc<Waitable<bool>>,
-}
-
-impl<T> ScopedJoinHandle<'_, T> {
-    /// Waits until the thread has ended; returns its result.
-    ///
-    /// # Errors
-    /// The panic of the thread.
-    #[track_caller]
-    pub fn join(self) -> thread::Result<T> {
-        self.ended.wait(|ended| ended.then_some(()));
-        self.thread.join()
-    }
-
-    /// Whether the thread has ended.
-    pub fn is_finished(&self) -> bool {
-        *self.ended.lock()
-    }
 }
 
 impl Clock {
@@ -110,17 +83,9 @@ impl Clock {
         name: &str,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> io::Result<JoinHandle<T>> {
-        let expected = Expected::new(self);
-        let ended = Arc::new(Waitable::new(self, false));
-        let end = SetAtEnd(Arc::clone(&ended));
-        let thread = thread::Builder::new()
-            .name(name.to_owned())
-            .spawn(move || {
-                let _participant = expected.arrive();
-                let _end = end;
-                work()
-            })?;
-        Ok(JoinHandle { thread, ended })
+        let (run, handle) = self.announced(work, ());
+        thread::Builder::new().name(name.to_owned()).spawn(run)?;
+        Ok(handle)
     }
 
     /// Runs `body`, which may start threads that borrow local values, and waits for their ends.
@@ -135,6 +100,25 @@ impl Clock {
             body(&scope)
         })
     }
+
+    /// What a participating thread has to run, and the handle for its end. `at_end` is dropped when `work` is done.
+    fn announced<T: Send, W: FnOnce() -> T + Send, E: Send>(
+        &self,
+        work: W,
+        at_end: E,
+    ) -> (impl FnOnce() + Send + use<T, W, E>, JoinHandle<T>) {
+        let expected = Expected::new(self);
+        let ended = Arc::new(Waitable::new(self, None));
+        let handle = JoinHandle(Arc::clone(&ended));
+        let run = move || {
+            // Until everybody has been told of the end.
+            let _participant = expected.arrive();
+            let _at_end = at_end;
+            let result = catch_unwind(AssertUnwindSafe(work));
+            ended.update(|ended| *ended = Some(result));
+        };
+        (run, handle)
+    }
 }
 
 impl<'scope> Scope<'scope, '_> {
@@ -146,21 +130,14 @@ impl<'scope> Scope<'scope, '_> {
         &self,
         name: &str,
         work: impl FnOnce() -> T + Send + 'scope,
-    ) -> io::Result<ScopedJoinHandle<'scope, T>> {
-        let expected = Expected::new(&self.clock);
-        let ended = Arc::new(Waitable::new(&self.clock, false));
+    ) -> io::Result<JoinHandle<T>> {
         *self.open.lock() += 1;
-        let count = CountDown(Arc::clone(&self.open));
-        let end = SetAtEnd(Arc::clone(&ended));
-        let thread =
-            thread::Builder::new()
-                .name(name.to_owned())
-                .spawn_scoped(self.scope, move || {
-                    let _participant = expected.arrive();
-                    let (_count, _end) = (count, end);
-                    work()
-                })?;
-        Ok(ScopedJoinHandle { thread, ended })
+        let (run, handle) = self
+            .clock
+            .announced(work, CountDown(Arc::clone(&self.open)));
+        let thread = thread::Builder::new().name(name.to_owned());
+        thread.spawn_scoped(self.scope, run)?;
+        Ok(handle)
     }
 }
 
@@ -190,15 +167,6 @@ impl Drop for Expected {
         if let Some(scheduler) = self.0.as_ref().and_then(Clock::scheduler) {
             scheduler.expect_no_more();
         }
-    }
-}
-
-/// Marks the thread as ended, also after a panic.
-struct SetAtEnd(Arc<Waitable<bool>>);
-
-impl Drop for SetAtEnd {
-    fn drop(&mut self) {
-        self.0.update(|ended| *ended = true);
     }
 }
 

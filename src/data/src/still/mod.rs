@@ -5,7 +5,7 @@
 //! | `format` | which format a file has, by its content, and which formats are read |
 //! | `decode` | the pixels, upright; what is missing of them |
 //! | `colour` | what the pixels' numbers stand for, and their conversion to light in Rec. 709 |
-//! | `exr`, `radiance`, `jpeg`, `tiff`, `isobmff` | what the decoders do not tell |
+//! | `exr`, `radiance`, `jpeg`, `tiff` | what the decoders do not tell |
 //!
 //! It knows bytes only, and no files.
 
@@ -14,7 +14,6 @@ mod decode;
 mod error;
 mod exr;
 mod format;
-mod isobmff;
 mod jpeg;
 mod names;
 mod orientation;

@@ -13,8 +13,7 @@ mod tests;
 
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 
-use super::protocol::ControllerState;
-use super::supervisor::PositionReport;
+use super::protocol::{ControllerState, StatusReport};
 use line::{Fit, Line};
 
 /// Minimum number of reports.
@@ -86,7 +85,7 @@ impl AngleFit {
 }
 
 /// A report as the journal keeps it; `None` for one that shows nothing of the part at constant speed.
-pub(crate) fn timed(report: &PositionReport, turn: &JournaledTurn) -> Option<JournaledReport> {
+pub(crate) fn timed(report: &StatusReport, turn: &JournaledTurn) -> Option<JournaledReport> {
     let usable =
         report.certain && report.state == ControllerState::Run && covers(turn, report.machine_deg);
     usable.then_some(JournaledReport {
@@ -162,11 +161,8 @@ impl Point {
 }
 
 /// Fits the track of a turn to its reports.
-pub(crate) fn fit(
-    reports: &[PositionReport],
-    expected: &JournaledTurn,
-) -> Result<AngleFit, String> {
-    let timed = |report: &PositionReport| self::timed(report, expected);
+pub(crate) fn fit(reports: &[StatusReport], expected: &JournaledTurn) -> Result<AngleFit, String> {
+    let timed = |report: &StatusReport| self::timed(report, expected);
     let reports: Vec<_> = reports.iter().filter_map(timed).collect();
     let points = points(&reports, expected);
     enough(&points, expected)?;

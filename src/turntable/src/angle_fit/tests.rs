@@ -59,7 +59,7 @@ impl Turn {
         -3.0 + 7.2 * self.rate * (t_us - START_US as f64) * 1e-6
     }
 
-    fn reports(&self, seed: u64) -> Vec<PositionReport> {
+    fn reports(&self, seed: u64) -> Vec<StatusReport> {
         let mut chance = Chance(seed % 2_000_000_000 + 1);
         let asked = (0..).map(|n| START_US + n * self.every_us);
         let asked = asked.take_while(|us| self.angle(*us as f64) < 363.0);
@@ -68,7 +68,7 @@ impl Turn {
             .collect()
     }
 
-    fn report(&self, asked_us: i64, chance: &mut Chance) -> PositionReport {
+    fn report(&self, asked_us: i64, chance: &mut Chance) -> StatusReport {
         let delay =
             |(least, added): (f64, f64), chance: &mut Chance| least - added * chance.next().ln();
         let latched = asked_us as f64 + delay(self.there_us, chance);
@@ -79,12 +79,12 @@ impl Turn {
             0.0
         };
         let chip = ((latched - START_US as f64) * self.rate) as u64;
-        PositionReport {
+        StatusReport {
             alarm: None,
             homed: None,
             state: ControllerState::Run,
             machine_deg: ((steps * STEP + off) * 1000.0).round() / 1000.0,
-            speed: 7.2,
+            feed: Some(432.0),
             chip_us: self.stamps.then_some(self.stamp.wrapping_add(chip as u32)),
             battery_v: None,
             pins: Pins::default(),
@@ -183,7 +183,7 @@ fn a_track_counts_its_reports() {
 fn turns_without_a_track_are_distinguished_by_their_cause() {
     let reports = USUAL.reports(1);
     let mut causes = HashSet::new();
-    let mut fails = |reports: &[PositionReport], expected: &JournaledTurn, named: &str| {
+    let mut fails = |reports: &[StatusReport], expected: &JournaledTurn, named: &str| {
         let error = fit(reports, expected).unwrap_err();
         assert!(error.contains(named), "{error}");
         assert!(causes.insert(error));
@@ -240,14 +240,14 @@ proptest! {
         reports in proptest::collection::vec(
             (any::<i32>(), any::<u16>(), -500.0..500.0f64, proptest::option::of(any::<u32>())), 0..80),
     ) {
-        let report = |(asked, took, machine_deg, chip_us): &(i32, u16, f64, Option<u32>)| PositionReport {
+        let report = |(asked, took, machine_deg, chip_us): &(i32, u16, f64, Option<u32>)| StatusReport {
             machine_deg: *machine_deg,
             chip_us: *chip_us,
             asked_us: Some(i64::from(*asked)),
             came_us: i64::from(*asked) + i64::from(*took),
             ..USUAL.report(0, &mut Chance(1))
         };
-        let reports: Vec<PositionReport> = reports.iter().map(report).collect();
+        let reports: Vec<StatusReport> = reports.iter().map(report).collect();
         if let Ok(track) = fit(&reports, &EXPECTED) {
             let (from_us, to_us) = track.constant_us();
             prop_assert!(from_us <= to_us && track.angle_at(from_us).unwrap().is_finite());

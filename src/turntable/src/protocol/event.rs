@@ -1,7 +1,7 @@
 //! The events of the protocol's state machine, and the outcomes of lines.
 
 use super::message::Message;
-use super::polling::Poll;
+use super::status::StatusReport;
 
 /// An event from the controller.
 #[derive(Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub enum ProtocolEvent {
         outcome: LineOutcome,
     },
     /// A status report.
-    Status(Poll),
+    Status(StatusReport),
     /// The controller has restarted; why, if it says so.
     Reset(Option<String>),
     /// An alarm with its number.

@@ -247,8 +247,8 @@ impl Machine {
             Message::Alarm(code) => self.events.push_back(ProtocolEvent::Alarm(code)),
             Message::Status(report) => {
                 self.counts.reports += 1;
-                let poll = self.polling.answered(report, first_us);
-                self.events.push_back(ProtocolEvent::Status(poll));
+                let report = self.polling.answered(report, first_us);
+                self.events.push_back(ProtocolEvent::Status(report));
             }
             Message::Banner(cause) => self.reset(cause),
             other => match &mut self.pending {

@@ -27,7 +27,6 @@ pub use event::{Counts, LineFault, LineOutcome, ProtocolEvent, SendError};
 pub use machine::Machine;
 pub use message::{Message, parse};
 pub use pending::ReplyTimeout;
-pub use polling::Poll;
 pub use status::{ControllerState, Pins, StatusReport};
 
 /// Real-time commands: single bytes that the controller takes out of the stream anywhere; never part

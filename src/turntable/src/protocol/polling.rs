@@ -7,19 +7,6 @@ const LOST_US: i64 = 120_000;
 /// How long after that a report may still answer the lost request, microseconds.
 const LATE_ANSWER_US: i64 = 500_000;
 
-/// A status report with the times of its request and its arrival.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Poll {
-    /// The report.
-    pub report: StatusReport,
-    /// When it was requested, microseconds; `None` for a report without request.
-    pub asked_us: Option<i64>,
-    /// When its first byte arrived, microseconds.
-    pub came_us: i64,
-    /// Whether it certainly answers that request and no earlier one.
-    pub certain: bool,
-}
-
 /// When to request a report, and which request is open.
 #[derive(Debug, Default)]
 pub(super) struct Polling {
@@ -58,16 +45,16 @@ impl Polling {
         self.asked_us = Some(now_us);
     }
 
-    /// Processes a report whose first byte arrived at `came_us`.
-    pub(super) fn answered(&mut self, report: StatusReport, came_us: i64) -> Poll {
+    /// The report whose first byte arrived at `came_us`, with its times.
+    pub(super) fn answered(&mut self, report: StatusReport, came_us: i64) -> StatusReport {
         let asked_us = self.asked_us.take_if(|asked_us| *asked_us <= came_us);
         let uncertain =
             asked_us.is_none_or(|asked| self.uncertain_until_us.is_some_and(|t| asked < t));
-        Poll {
-            report,
+        StatusReport {
             asked_us,
             came_us,
             certain: !uncertain,
+            ..report
         }
     }
 

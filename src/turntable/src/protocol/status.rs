@@ -96,8 +96,8 @@ impl Pins {
     }
 }
 
-/// A status report. What is not known in it is skipped, as Grbl's documentation demands; a damaged
-/// position or speed makes the whole report noise.
+/// A status report, with the times of its request and its arrival. What is not known in it is skipped, as Grbl's
+/// documentation demands; a damaged position or speed makes the whole report noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StatusReport {
     /// The controller's state.
@@ -105,7 +105,7 @@ pub struct StatusReport {
     /// The alarm's number, where the state comes with it (`Alarm:11`).
     pub alarm: Option<u8>,
     /// The table's position from machine zero, degrees.
-    pub position: f64,
+    pub machine_deg: f64,
     /// Speed, the controller's unit per minute.
     pub feed: Option<f64>,
     /// Microseconds of the chip's clock at the moment of the position; wraps. Only the rig's firmware
@@ -117,9 +117,16 @@ pub struct StatusReport {
     pub pins: Pins,
     /// Whether the controller counts itself as homed (grblHAL's `H:`).
     pub homed: Option<bool>,
+    /// When it was requested, microseconds; `None` for a report without request.
+    pub asked_us: Option<i64>,
+    /// When its first byte arrived, microseconds.
+    pub came_us: i64,
+    /// Whether it certainly answers that request and no earlier one.
+    pub certain: bool,
 }
 
 impl StatusReport {
+    /// Reads a report, whose times are not known yet.
     pub(super) fn parse(line: &str) -> Option<StatusReport> {
         let inside = line.strip_prefix('<')?.strip_suffix('>')?;
         if inside.contains(['<', '>']) {
@@ -131,48 +138,40 @@ impl StatusReport {
         let sub = whole(sub);
         let state = ControllerState::from_name(name, sub)?;
         let alarm = sub.filter(|_| state == ControllerState::Alarm);
-        let mut read = Fields::default();
-        for field in fields {
-            if let Some((name, value)) = field.split_once(':') {
-                read.take(name, value)?;
-            }
-        }
-        Some(StatusReport {
+        let mut report = StatusReport {
             state,
             alarm: alarm.and_then(|code| u8::try_from(code).ok()),
-            position: read.position?,
-            feed: read.feed,
-            chip_us: read.chip_us,
-            battery_v: read.battery_v,
-            pins: read.pins,
-            homed: read.homed,
-        })
-    }
-}
-
-#[derive(Default)]
-struct Fields {
-    position: Option<f64>,
-    feed: Option<f64>,
-    chip_us: Option<u32>,
-    battery_v: Option<f64>,
-    pins: Pins,
-    homed: Option<bool>,
-}
-
-impl Fields {
-    /// Reads a field; `None` if one that decides where the table is is damaged or repeated.
-    fn take(&mut self, name: &str, value: &str) -> Option<()> {
-        match name {
-            "MPos" => once(&mut self.position, first(value)?)?,
-            "FS" | "F" => once(&mut self.feed, first(value)?)?,
-            "T" => self.chip_us = whole(value),
-            "Bat" => self.battery_v = decimal(value),
-            "Pn" => self.pins = Pins::from_letters(value),
-            "H" => self.homed = homed(value),
-            _ => {}
+            machine_deg: 0.0,
+            feed: None,
+            chip_us: None,
+            battery_v: None,
+            pins: Pins::default(),
+            homed: None,
+            asked_us: None,
+            came_us: 0,
+            certain: false,
+        };
+        let mut position = None;
+        for (name, value) in fields.filter_map(|field| field.split_once(':')) {
+            // One that decides where the table is must be neither damaged nor repeated.
+            match name {
+                "MPos" => once(&mut position, first(value)?)?,
+                "FS" | "F" => once(&mut report.feed, first(value)?)?,
+                "T" => report.chip_us = whole(value),
+                "Bat" => report.battery_v = decimal(value),
+                "Pn" => report.pins = Pins::from_letters(value),
+                "H" => report.homed = homed(value),
+                _ => {}
+            }
         }
-        Some(())
+        report.machine_deg = position?;
+        Some(report)
+    }
+
+    /// Whether the next report agrees with this one. In motion, positions differ.
+    pub(crate) fn confirms(&self, next: &StatusReport) -> bool {
+        let same = self.machine_deg == next.machine_deg || next.state.may_move();
+        self.state == next.state && self.alarm == next.alarm && same
     }
 }
 

@@ -4,21 +4,22 @@
 //! monitors a motion in progress, and brings the table to a standstill when something goes wrong.
 //! It knows nothing of turns.
 
+mod controller_features;
 mod fault;
 mod motion;
-mod position_report;
 mod stop;
 #[cfg(test)]
 mod tests;
 
 use super::codes::Alarm;
 use super::protocol::{
-    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ProtocolEvent, ReplyTimeout,
-    SendError,
+    ControllerState, Counts, LineFault, LineOutcome, Machine, ProtocolEvent, ReplyTimeout,
+    SendError, StatusReport,
 };
+pub(crate) use controller_features::ControllerFeatures;
 pub use fault::MotionFault;
 pub(crate) use motion::{Motion, MotionGoal};
-pub(crate) use position_report::{ControllerFeatures, PositionReport};
+
 pub(crate) use stop::{Stop, StopOutcome};
 
 /// Interval of reports while the table is being stopped, microseconds.
@@ -31,12 +32,12 @@ const HOST_RESET: &str = "host";
 const MAX_RECORDED: usize = 54_000;
 
 /// The state of one table, and the protocol to it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Supervisor {
     machine: Machine,
     traits: ControllerFeatures,
     answer: Option<(u64, LineOutcome)>,
-    last_report: Option<PositionReport>,
+    last_report: Option<StatusReport>,
     confirmed: bool,
     /// Machine position of the angle 0, degrees; `None` if it is unknown.
     zero_deg: Option<f64>,
@@ -54,9 +55,9 @@ pub(crate) struct Supervisor {
     motion: Option<Motion>,
     fault: Option<MotionFault>,
     stop: Option<Stop>,
-    /// The last stop's effect on the position has been applied.
-    settled: bool,
-    recorded: Option<Vec<PositionReport>>,
+    /// The last stop's effect on the position has to be applied.
+    is_unapplied: bool,
+    recorded: Option<Vec<StatusReport>>,
     wanted_until_us: i64,
     closed: Option<String>,
     /// Something has changed that a thread may be waiting for.
@@ -66,26 +67,8 @@ pub(crate) struct Supervisor {
 impl Supervisor {
     pub(crate) fn new(traits: ControllerFeatures) -> Self {
         Self {
-            machine: Machine::new(),
             traits,
-            answer: None,
-            last_report: None,
-            confirmed: false,
-            zero_deg: None,
-            restarted: false,
-            rest_deg: None,
-            homed: None,
-            alarm: None,
-            emergency_stop: false,
-            restarts: 0,
-            motion: None,
-            fault: None,
-            stop: None,
-            settled: true,
-            recorded: None,
-            wanted_until_us: i64::MIN,
-            closed: None,
-            changed: false,
+            ..Self::default()
         }
     }
 
@@ -101,7 +84,7 @@ impl Supervisor {
         self.machine.is_checked()
     }
 
-    pub(crate) fn last_report(&self) -> Option<&PositionReport> {
+    pub(crate) fn last_report(&self) -> Option<&StatusReport> {
         self.last_report.as_ref()
     }
 
@@ -228,12 +211,12 @@ impl Supervisor {
         self.recorded = Some(Vec::new());
     }
 
-    pub(crate) fn recorded(&self) -> &[PositionReport] {
+    pub(crate) fn recorded(&self) -> &[StatusReport] {
         self.recorded.as_deref().unwrap_or_default()
     }
 
     /// Ends the recording; returns the reports.
-    pub(crate) fn take_recorded(&mut self) -> Vec<PositionReport> {
+    pub(crate) fn take_recorded(&mut self) -> Vec<StatusReport> {
         self.recorded.take().unwrap_or_default()
     }
 
@@ -286,7 +269,7 @@ impl Supervisor {
 
     fn halt(&mut self, now_us: i64, unsettled: bool) {
         if !self.is_stopping() {
-            self.settled = false;
+            self.is_unapplied = true;
             self.machine.give_up();
             self.stop = Some(Stop::begin(now_us, unsettled, &mut self.machine));
         }
@@ -351,7 +334,7 @@ impl Supervisor {
             self.changed = true;
             match event {
                 ProtocolEvent::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
-                ProtocolEvent::Status(poll) => self.on_report(now_us, &poll),
+                ProtocolEvent::Status(report) => self.on_report(now_us, report),
                 ProtocolEvent::Reset(cause) => self.on_reset(now_us, cause),
                 ProtocolEvent::Alarm(code) => self.on_alarm(now_us, code),
             }
@@ -369,8 +352,8 @@ impl Supervisor {
         self.answer = Some((id, outcome));
     }
 
-    fn on_report(&mut self, now_us: i64, poll: &Poll) {
-        let report = PositionReport::from_poll(poll, &self.traits);
+    fn on_report(&mut self, now_us: i64, mut report: StatusReport) {
+        report.chip_us = report.chip_us.filter(|_| self.traits.stamps);
         self.confirmed = self
             .last_report
             .is_some_and(|before| before.confirms(&report));
@@ -408,7 +391,7 @@ impl Supervisor {
     }
 
     /// Notes what a report says about an alarm.
-    fn note_alarm(&mut self, report: &PositionReport) {
+    fn note_alarm(&mut self, report: &StatusReport) {
         if report.state != ControllerState::Alarm {
             self.alarm = None;
             self.emergency_stop = false;
@@ -427,7 +410,7 @@ impl Supervisor {
 
     /// Whether a report shows that the controller counts from another place than before although the
     /// table was not sent there: it has restarted, and its banner was lost or is none that is known.
-    fn is_displaced(&mut self, report: &PositionReport) -> bool {
+    fn is_displaced(&mut self, report: &StatusReport) -> bool {
         let tolerance_deg = self.traits.tolerance_deg();
         let was_homed = self.homed;
         self.homed = report.homed.or(was_homed);
@@ -459,11 +442,10 @@ impl Supervisor {
         let Some(outcome) = self.stopped() else {
             return;
         };
-        if !self.settled && outcome != StopOutcome::Stopped {
+        if self.is_unapplied && outcome != StopOutcome::Stopped {
             self.zero_deg = None;
         }
-        self.changed |= !self.settled;
-        self.settled = true;
+        self.changed |= std::mem::take(&mut self.is_unapplied);
     }
 
     fn on_reset(&mut self, now_us: i64, cause: Option<String>) {

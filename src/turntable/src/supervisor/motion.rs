@@ -1,8 +1,8 @@
 //! Monitoring a motion: whether it continues, and where it ends.
 
-use super::{ControllerFeatures, MotionFault, PositionReport};
+use super::{ControllerFeatures, MotionFault};
 use crate::codes::Alarm;
-use crate::protocol::ControllerState;
+use crate::protocol::{ControllerState, StatusReport};
 
 /// Longest silence of a controller in motion, microseconds.
 const SILENCE_US: i64 = 2_000_000;
@@ -75,7 +75,7 @@ impl Motion {
     /// Processes a report; returns the fault that it shows.
     pub(super) fn on_report(
         &mut self,
-        report: &PositionReport,
+        report: &StatusReport,
         alarm: Option<Alarm>,
         traits: &ControllerFeatures,
     ) -> Option<MotionFault> {
@@ -108,7 +108,7 @@ impl Motion {
 
     /// Whether the table is reported farther from its target than it has been. It only comes nearer,
     /// unless the controller has restarted and counts from another place.
-    pub(super) fn went_back(&mut self, report: &PositionReport, tolerance_deg: f64) -> bool {
+    pub(super) fn went_back(&mut self, report: &StatusReport, tolerance_deg: f64) -> bool {
         let MotionGoal::To { target_deg, .. } = self.goal else {
             return false;
         };
@@ -127,7 +127,7 @@ impl Motion {
 
     fn on_idle(
         &mut self,
-        report: &PositionReport,
+        report: &StatusReport,
         target_deg: f64,
         stands_us: i64,
         traits: &ControllerFeatures,
@@ -162,7 +162,7 @@ impl Motion {
 
     /// How long the table has certainly been at the position of this report, microseconds: from the
     /// arrival of the first report of it to the request for this one.
-    fn stands_for(&mut self, report: &PositionReport) -> i64 {
+    fn stands_for(&mut self, report: &StatusReport) -> i64 {
         match self.place {
             Some((place, since_us)) if place == report.machine_deg => {
                 let asked_us = report.asked_us.filter(|_| report.certain);

@@ -3,8 +3,7 @@
 //! `!` ramps the table down. At a standstill, a reset discards the remaining motions without losing
 //! the position. The table is reset in motion only if it does not answer or does not slow down.
 
-use super::PositionReport;
-use crate::protocol::{ControllerState, Machine, realtime};
+use crate::protocol::{ControllerState, Machine, StatusReport, realtime};
 
 /// Interval at which the feed hold is repeated, microseconds.
 const REPEAT_US: i64 = 250_000;
@@ -132,12 +131,7 @@ impl Stop {
         gentle
     }
 
-    pub(super) fn on_report(
-        &mut self,
-        now_us: i64,
-        report: &PositionReport,
-        machine: &mut Machine,
-    ) {
+    pub(super) fn on_report(&mut self, now_us: i64, report: &StatusReport, machine: &mut Machine) {
         self.heard_us = now_us;
         if report
             .asked_us
@@ -179,7 +173,7 @@ impl Stop {
         }
     }
 
-    fn stands(&mut self, report: &PositionReport) -> bool {
+    fn stands(&mut self, report: &StatusReport) -> bool {
         let count = match self.standing {
             Some((place, count)) if place == report.machine_deg => count + 1,
             _ => 1,

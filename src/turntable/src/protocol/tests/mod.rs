@@ -378,7 +378,7 @@ fn a_report_of_a_relative_gives_its_state_its_alarm_and_its_pins() {
         (tool.state, tool.homed),
         (ControllerState::Held, Some(true))
     );
-    assert_eq!(tool.position, 1.0);
+    assert_eq!(tool.machine_deg, 1.0);
     let states = [
         ("Hold", ControllerState::Held),
         ("Hold:0", ControllerState::Held),

@@ -33,7 +33,7 @@ impl fmt::Display for StatusReport {
         if let Some(code) = self.alarm {
             write!(f, ":{code}")?;
         }
-        write!(f, "|MPos:{},0.000,0.000", shown(self.position, 3))?;
+        write!(f, "|MPos:{},0.000,0.000", shown(self.machine_deg, 3))?;
         if let Some(feed) = self.feed {
             write!(f, "|FS:{feed},0")?;
         }

@@ -190,11 +190,14 @@ fn report() -> impl Strategy<Value = StatusReport> {
             state,
             alarm: alarm.filter(|_| state == Alarm),
             homed,
-            position,
+            machine_deg: position,
             feed,
             chip_us,
             battery_v,
             pins,
+            asked_us: None,
+            came_us: 0,
+            certain: false,
         },
     )
 }

@@ -1,37 +1,69 @@
 //! The segments of a JPEG, and whether all of its picture is there: decoders fill up what is missing with grey, and say
 //! nothing.
 
-mod huffman;
-mod scans;
-
 use std::borrow::Cow;
+use std::io::Cursor;
+
+use image::{DynamicImage, ImageFormat, ImageReader, ImageResult};
 
 const SOI: u8 = 0xd8;
 const EOI: u8 = 0xd9;
 const SOS: u8 = 0xda;
 const APP2: u8 = 0xe2;
+/// Frames whose blocks come whole, one after the other, with Huffman's codes. Cameras that forget the end marker write no
+/// others.
+const SEQUENTIAL: [u8; 2] = [0xc0, 0xc1];
+/// Bytes that stand in for what may be missing of a scan: more than a decoder reads ahead.
+const STAND_IN: usize = 64;
 
-/// The file, which ends with the marker EOI; where only the marker is missing it is put behind the last scan. `None` if a
-/// part of the picture is missing.
+/// The picture, if all of it is there. A file may lack its end marker: then the scan is whole if the picture does not
+/// depend on what follows it. `None` if a part of the picture is missing.
 pub(crate) fn whole(bytes: &[u8]) -> Option<Cow<'_, [u8]>> {
     if has_end(bytes) {
         return Some(Cow::Borrowed(bytes));
     }
-    let end = scans::end(bytes)?;
-    Some(Cow::Owned([&bytes[..end], &[0xff, EOI]].concat()))
+    let scan = only_scan(bytes)?;
+    // Any bit that is missing is another one in each of them.
+    let [one, other] = [0x55, 0xaa].map(|bits| picture(&followed_by(scan, &[bits; STAND_IN])));
+    (one.ok()? == other.ok()?).then(|| Cow::Owned(followed_by(scan, &[])))
+}
+
+/// The file up to the end of its scan, if that is the only one a whole picture needs.
+fn only_scan(bytes: &[u8]) -> Option<&[u8]> {
+    let mut segments = segments(bytes);
+    let (_, frame, _) = segments.find(|(marker, ..)| SEQUENTIAL.contains(marker))?;
+    let (_, scan, start) = segments.find(|(marker, ..)| *marker == SOS)?;
+    if frame.get(5) != scan.first() {
+        return None;
+    }
+    let mut end = start;
+    while let Some((0x00 | 0xd0..=0xd7, after)) = next_marker(bytes, end) {
+        end = after;
+    }
+    let end = next_marker(bytes, end).map_or(bytes.len(), |(_, after)| after - 2);
+    // Bytes 0xff before a marker do not belong to the scan.
+    let length = bytes[..end].iter().rposition(|&byte| byte != 0xff)? + 1;
+    Some(&bytes[..length])
+}
+
+fn followed_by(scan: &[u8], bits: &[u8]) -> Vec<u8> {
+    [scan, bits, &[0xff, EOI]].concat()
+}
+
+fn picture(bytes: &[u8]) -> ImageResult<DynamicImage> {
+    ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg).decode()
 }
 
 /// How many components its pixels have.
 pub(crate) fn components(bytes: &[u8]) -> Option<u8> {
-    let (_, frame) = segments(bytes).find(|&(marker, _)| is_frame(marker))?;
+    let (_, frame, _) = segments(bytes).find(|&(marker, ..)| is_frame(marker))?;
     frame.get(5).copied()
 }
 
 /// Whether a segment has a part of a colour profile.
 pub(crate) fn has_profile(bytes: &[u8]) -> bool {
-    let is_part =
-        |(marker, content): (u8, &[u8])| marker == APP2 && content.starts_with(b"ICC_PROFILE\0");
-    segments(bytes).any(is_part)
+    segments(bytes)
+        .any(|(marker, content, _)| marker == APP2 && content.starts_with(b"ICC_PROFILE\0"))
 }
 
 /// Whether a marker begins a frame's header: SOF, and not DHT, JPG or DAC.
@@ -39,15 +71,14 @@ fn is_frame(marker: u8) -> bool {
     matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc)
 }
 
-/// The segments before the first scan: markers and contents.
-fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+/// The segments up to that of the first scan: markers, contents, and the places behind them.
+fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8], usize)> {
     let mut at = 2;
-    let next = move || {
-        let (marker, content, after) = segment(bytes, at)?;
-        at = after;
-        Some((marker, content))
-    };
-    std::iter::from_fn(next).take_while(|&(marker, _)| marker != SOS)
+    std::iter::from_fn(move || {
+        let found = segment(bytes, at)?;
+        at = if found.0 == SOS { bytes.len() } else { found.2 };
+        Some(found)
+    })
 }
 
 /// The next segment from a place on: its marker, its content, and the place behind it.
