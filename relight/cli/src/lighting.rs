@@ -133,42 +133,30 @@ impl RotationArguments {
 pub(crate) struct ShadingArgument {
     /// How light becomes shading and highlights.
     #[arg(long, value_name = "MODEL", default_value = "physical", value_parser = one_of(SHADING_MODELS))]
-    shading_model: ShadingModel,
+    shading_model: (DiffuseForm, SpecularForm),
 }
 
-#[derive(Clone, Copy)]
-enum ShadingModel {
-    Physical,
-    Paper,
-}
-
-const SHADING_MODELS: Choices<ShadingModel> = &[
+const SHADING_MODELS: Choices<(DiffuseForm, SpecularForm)> = &[
     (
         "physical",
         "Irradiance, and the Blinn-Phong lobe in zonal harmonics",
-        ShadingModel::Physical,
+        (DiffuseForm::Irradiance, SpecularForm::Lobe),
     ),
     (
         "paper",
         "The paper's formulas as in its released code, from nine coefficients",
-        ShadingModel::Paper,
+        (DiffuseForm::Released, SpecularForm::Power),
     ),
 ];
 
 impl ShadingArgument {
     /// The diffuse layer.
     pub(crate) fn diffuse(&self) -> DiffuseForm {
-        match self.shading_model {
-            ShadingModel::Physical => DiffuseForm::Irradiance,
-            ShadingModel::Paper => DiffuseForm::Released,
-        }
+        self.shading_model.0
     }
 
     /// The specular layer.
     pub(crate) fn specular(&self) -> SpecularForm {
-        match self.shading_model {
-            ShadingModel::Physical => SpecularForm::Lobe,
-            ShadingModel::Paper => SpecularForm::Power,
-        }
+        self.shading_model.1
     }
 }

@@ -70,7 +70,6 @@ fn a_library_is_packed_and_samples_are_drawn_from_it() {
         table.contains("object,models/block.obj,block,,Ann,CC0-1.0,models,training,12,"),
         "{table}"
     );
-    assert!(at("a.md").exists());
     assert_eq!(build(&at("a.zip")).status.code(), Some(1));
 
     let out = at("samples");

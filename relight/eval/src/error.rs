@@ -45,15 +45,6 @@ pub enum EvalError {
         /// Why.
         source: Cause,
     },
-    /// A folder holds a set of another recipe.
-    #[error(
-        "{} holds objects that were made with other settings: give the same ones, or another folder",
-        path.display()
-    )]
-    OtherSettings {
-        /// The folder.
-        path: PathBuf,
-    },
     /// Objects cannot be made.
     #[error(transparent)]
     Synth(#[from] relight_synth::SynthError),

@@ -144,15 +144,10 @@ fn brought_to(path: PathBuf, planes: Planes<3>, extent: Extent) -> Result<Planes
     if times > 1 && found == Extent::new(times * extent.width, times * extent.height) {
         return Ok(planes.resized(extent));
     }
-    check_size(path, found, extent)?;
-    Ok(planes)
-}
-
-fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), EvalError> {
-    if found == expected {
-        return Ok(());
+    if found == extent {
+        return Ok(planes);
     }
-    Err(EvalError::size(&path, found, expected))
+    Err(EvalError::size(&path, found, extent))
 }
 
 /// A light in a file of coefficients.

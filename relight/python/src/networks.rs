@@ -74,21 +74,15 @@ pub(crate) fn network_maps<'py>(
         Ok((encoded.decode(&values(pixels)), values(light)))
     })?;
     let found = PyDict::new(py);
-    let normals = Array::from_planes(maps.normals.planes());
-    found.set_item("normals", normals.into_python(py)?)?;
-    found.set_item("albedo", Array::from_planes(&maps.albedo).into_python(py)?)?;
-    found.set_item(
-        "shading",
-        Array::from_planes(&maps.shading).into_python(py)?,
-    )?;
-    found.set_item(
-        "highlight",
-        Array::from_planes(&maps.highlight).into_python(py)?,
-    )?;
-    found.set_item("paint", Array::from_planes(&maps.paint).into_python(py)?)?;
-    found.set_item(
-        "light",
-        Array::new(vec![light.len()], light).into_python(py)?,
-    )?;
+    for (name, map) in [
+        ("normals", Array::from_planes(maps.normals.planes())),
+        ("albedo", Array::from_planes(&maps.albedo)),
+        ("shading", Array::from_planes(&maps.shading)),
+        ("highlight", Array::from_planes(&maps.highlight)),
+        ("paint", Array::from_planes(&maps.paint)),
+        ("light", Array::new(vec![light.len()], light)),
+    ] {
+        found.set_item(name, map.into_python(py)?)?;
+    }
     Ok(found)
 }

@@ -105,19 +105,18 @@ pub(crate) fn decompose<'py>(
         paint: true,
         ..DecomposeOptions::default()
     };
-    let (layers, found, notes) = unlocked(py, || {
+    let ((layers, mask), found, notes) = unlocked(py, || {
         let photo = photograph.load()?;
         let options = photo.options(&options);
         let found = decomposer()?.decompose(&photo.picture, &photo.mask, &options)?;
-        Ok((Layers::new(&found, &photo.mask), found, photo.notes))
+        let mask = Array::from_mask(&photo.mask);
+        Ok(((layers(&found, &photo.mask), mask), found, photo.notes))
     })?;
     let fields = PyDict::new(py);
-    fields.set_item("normals", layers.normals.into_python(py)?)?;
-    fields.set_item("albedo", layers.albedo.into_python(py)?)?;
-    fields.set_item("shading", layers.shading.into_python(py)?)?;
-    fields.set_item("highlight", layers.highlight.into_python(py)?)?;
-    fields.set_item("confidence", layers.confidence.into_python(py)?)?;
-    fields.set_item("mask", layers.mask.into_python(py)?)?;
+    for (name, layer) in layers {
+        fields.set_item(name, layer.into_python(py)?)?;
+    }
+    fields.set_item("mask", mask.into_python(py)?)?;
     fields.set_item("light", Array::from_light(&found.light).into_python(py)?)?;
     let gloss = found
         .gloss
@@ -128,34 +127,22 @@ pub(crate) fn decompose<'py>(
     Ok((fields, notes))
 }
 
-/// The layers of a decomposition.
-struct Layers {
-    normals: Array<f32>,
-    albedo: Array<f32>,
-    shading: Array<f32>,
-    highlight: Array<f32>,
-    confidence: Array<f32>,
-    mask: Array<bool>,
-}
-
-impl Layers {
-    fn new(found: &Decomposition, mask: &Planes<1>) -> Self {
-        // Paint outside the mask is 0, which would be certain.
-        let mut confidence = match &found.paint {
-            Some(paint) => paint.clone().map(|paint| (2.0 * paint - 1.0).abs()),
-            None => Planes::zeros(mask.extent()),
-        };
-        let pixels = confidence.planes_mut()[0].iter_mut().zip(mask.plane(0));
-        pixels.for_each(|(value, &mask)| *value *= f32::from(u8::from(mask >= 0.5)));
-        Self {
-            normals: Array::from_planes(found.normals.planes()),
-            albedo: Array::from_planes(found.albedo.planes()),
-            shading: Array::from_planes(&found.shading),
-            highlight: Array::from_planes(&found.highlight),
-            confidence: Array::from_planes(&confidence),
-            mask: Array::from_mask(mask),
-        }
-    }
+/// The layers of a decomposition by name.
+fn layers(found: &Decomposition, mask: &Planes<1>) -> [(&'static str, Array<f32>); 5] {
+    // Paint outside the mask is 0, which would be certain.
+    let mut confidence = match &found.paint {
+        Some(paint) => paint.clone().map(|paint| (2.0 * paint - 1.0).abs()),
+        None => Planes::zeros(mask.extent()),
+    };
+    let pixels = confidence.planes_mut()[0].iter_mut().zip(mask.plane(0));
+    pixels.for_each(|(value, &mask)| *value *= f32::from(u8::from(mask >= 0.5)));
+    [
+        ("normals", Array::from_planes(found.normals.planes())),
+        ("albedo", Array::from_planes(found.albedo.planes())),
+        ("shading", Array::from_planes(&found.shading)),
+        ("highlight", Array::from_planes(&found.highlight)),
+        ("confidence", Array::from_planes(&confidence)),
+    ]
 }
 
 /// The background of a relit object.

@@ -51,7 +51,7 @@ pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded,
 pub use mesh::Mesh;
 pub use pack::{LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library};
 pub use random::stream;
-pub use samples::folder::{SynthSummary, write_samples};
+pub use samples::folder::{SampleFolder, SynthSummary, write_samples};
 pub use samples::object::{ObjectSource, SyntheticView};
 pub use samples::recipe::Recipe;
 pub use samples::sample::SynthSample;

@@ -68,21 +68,6 @@ pub struct Folders {
     pub panoramas: Option<PathBuf>,
 }
 
-impl Folders {
-    /// Whether a file that one folder is not read for may be of use because another one is the same.
-    fn use_elsewhere(&self, path: &Path) -> bool {
-        let is_in = |folder: &Option<PathBuf>| {
-            folder
-                .as_ref()
-                .is_some_and(|folder| path.starts_with(folder))
-        };
-        // Meshes have files of many kinds beside them.
-        is_in(&self.meshes)
-            || is_in(&self.textures) && TEXTURES.includes(path)
-            || is_in(&self.panoramas) && PANORAMAS.includes(path)
-    }
-}
-
 impl Library {
     /// Reads all files of the kinds in these folders, in the order of their names, and all of packed libraries: see
     /// [`Self::training`]. Where no folder of panoramas is given, 13 are made. Meshes of other kinds are left out.
@@ -91,27 +76,22 @@ impl Library {
     /// If a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
         let packed = LibraryContents::from_folders(folders)?;
-        let (meshes, mut left_out) = match &folders.meshes {
+        let (meshes, left_out) = match &folders.meshes {
             Some(path) if pack::is_packed(path) => (packed.meshes, Vec::new()),
             Some(folder) => read_meshes(folder)?,
             None => (Vec::new(), Vec::new()),
         };
-        let mut unused = Vec::new();
         let textures = match &folders.textures {
-            Some(folder) => read_all(folder, &TEXTURES, &mut unused, TextureImage::read)?,
+            Some(folder) => read_all(folder, &TEXTURES, TextureImage::read)?,
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
             Some(path) if pack::is_packed(path) => packed.panoramas,
-            Some(folder) => read_all(folder, &PANORAMAS, &mut unused, |path| {
+            Some(folder) => read_all(folder, &PANORAMAS, |path| {
                 Panorama::read(path).map_err(SynthError::Image)
             })?,
             None => made_panoramas()?,
         };
-        unused.retain(|one| !folders.use_elsewhere(&one.path));
-        unused.sort_by(|one: &SkippedFile, other| one.path.cmp(&other.path));
-        unused.dedup_by(|one, other| one.path == other.path);
-        left_out.append(&mut unused);
         let mut pictures: Vec<TextureImage> =
             textures.into_iter().map(|(_, picture)| picture).collect();
         pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
@@ -194,6 +174,11 @@ impl Library {
         });
         let pictures: Vec<String> = pictures.collect();
         Digest::hash([meshes.concat(), pictures.concat()].join("\n").as_bytes())
+    }
+
+    /// The names of its meshes.
+    pub fn mesh_names(&self) -> Vec<String> {
+        self.meshes.iter().map(|(name, _)| name.clone()).collect()
     }
 
     /// The same without its meshes: all shapes are made.
@@ -280,6 +265,13 @@ pub(crate) const MESHES: FileKind = FileKind {
     what: "meshes",
     extensions: &["obj", "gltf", "glb"],
 };
+/// Meshes that are not read: what else lies beside meshes are pictures and texts.
+const OTHER_MESHES: FileKind = FileKind {
+    what: "other meshes",
+    extensions: &[
+        "3ds", "3mf", "blend", "dae", "fbx", "ply", "stl", "usd", "usda", "usdc", "usdz",
+    ],
+};
 const TEXTURES: FileKind = FileKind {
     what: "textures",
     extensions: &[
@@ -291,40 +283,23 @@ pub(crate) const PANORAMAS: FileKind = FileKind {
     extensions: &["hdr", "exr"],
 };
 
-/// How files of meshes end that are not read.
-const OTHER_MESHES: [&str; 35] = [
-    "3ds", "3mf", "abc", "amf", "blend", "bvh", "c4d", "cob", "dae", "dxf", "fbx", "iges", "igs",
-    "lwo", "lxo", "ma", "max", "mb", "md2", "md5mesh", "ms3d", "off", "ply", "skp", "step", "stl",
-    "stp", "usd", "usda", "usdc", "usdz", "vrm", "wrl", "x", "x3d",
-];
-
 type NamedMeshes = Vec<(String, Mesh)>;
 
-/// All meshes of a folder and its subfolders, and the unused files.
+/// All meshes of a folder and its subfolders, and what of them is not used.
 fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<SkippedFile>), SynthError> {
-    let files = files_below(folder)?;
-    let (wanted, others): (Vec<PathBuf>, Vec<PathBuf>) =
-        files.into_iter().partition(|path| MESHES.includes(path));
-    let kind = |path: &Path| extension(path).filter(|kind| OTHER_MESHES.contains(&kind.as_str()));
-    let others = others
-        .into_iter()
-        .filter_map(|path| Some((kind(&path)?, path)));
-    let others = others.map(|(kind, path)| SkippedFile {
-        path,
-        what: format!(
-            "files of meshes in the format {} are not read: save it as .glb, .gltf or .obj",
-            kind.to_uppercase()
-        ),
-    });
-    let mut left_out: Vec<SkippedFile> = others.collect();
-    if wanted.is_empty() {
-        return Err(match left_out.first() {
-            Some(first) => SynthError::unusable(&first.path, NOT_READ),
-            None => MESHES.missing(folder),
-        });
-    }
-    let mut meshes = Vec::with_capacity(wanted.len());
-    for path in wanted {
+    let mut left_out = Vec::new();
+    let mut meshes = Vec::new();
+    for path in files_below(folder)? {
+        if OTHER_MESHES.includes(&path) {
+            left_out.push(SkippedFile {
+                path,
+                what: NOT_READ.to_owned(),
+            });
+            continue;
+        }
+        if !MESHES.includes(&path) {
+            continue;
+        }
         let mesh = Mesh::read(&path)?;
         left_out.extend(mesh.left_out.iter().map(|what| SkippedFile {
             path: path.clone(),
@@ -333,6 +308,9 @@ fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<SkippedFile>), SynthEr
         let name = path.strip_prefix(folder).unwrap_or(&path);
         let parts: Vec<_> = name.iter().map(OsStr::to_string_lossy).collect();
         meshes.push((parts.join("/"), mesh));
+    }
+    if meshes.is_empty() {
+        return Err(MESHES.missing(folder));
     }
     Ok((meshes, left_out))
 }
@@ -386,28 +364,18 @@ impl FileKind {
     }
 }
 
-/// Every file of the wanted kind in a folder, by name; files of other kinds are `left_out`.
+/// Every file of the wanted kind in a folder, by name.
 fn read_all<T>(
     folder: &Path,
     wanted: &FileKind,
-    left_out: &mut Vec<SkippedFile>,
     read: impl Fn(&Path) -> Result<T, SynthError>,
 ) -> Result<Vec<(String, T)>, SynthError> {
-    let mut files = members(folder)?;
-    files.sort();
-    let (paths, others): (Vec<PathBuf>, Vec<PathBuf>) =
-        files.into_iter().partition(|path| wanted.includes(path));
+    let mut paths = members(folder)?;
+    paths.retain(|path| wanted.includes(path));
+    paths.sort();
     if paths.is_empty() {
         return Err(wanted.missing(folder));
     }
-    left_out.extend(others.into_iter().map(|path| SkippedFile {
-        path,
-        what: format!(
-            "{} are read from files that end in .{}",
-            wanted.what,
-            wanted.extensions.join(", .")
-        ),
-    }));
     let named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
         Ok((name.to_string_lossy().into_owned(), read(path)?))
@@ -440,29 +408,6 @@ mod tests {
             error.contains("panoramas") && error.contains("exr"),
             "{error}"
         );
-    }
-
-    #[test]
-    fn other_files_among_panoramas_and_textures_are_left_out_and_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
-        let room = [&header[..], &[0x80; 4 * 4 * 8]].concat();
-        std::fs::write(at("room.hdr"), room).unwrap();
-        let wood = image::RgbImage::from_pixel(2, 2, image::Rgb([90, 60, 30]));
-        wood.save(at("wood.png")).unwrap();
-        for name in ["sky.jpg.part", "notes.txt", ".DS_Store"] {
-            std::fs::write(at(name), "").unwrap();
-        }
-        let library = Library::read(&Folders {
-            panoramas: Some(folder.path().to_owned()),
-            textures: Some(folder.path().to_owned()),
-            ..Folders::default()
-        })
-        .unwrap();
-        let of = |one: &SkippedFile| one.path.strip_prefix(folder.path()).unwrap().to_owned();
-        let named: Vec<PathBuf> = library.left_out.iter().map(of).collect();
-        assert_eq!(named, ["notes.txt", "sky.jpg.part"].map(PathBuf::from));
     }
 
     #[test]
@@ -538,17 +483,6 @@ mod tests {
         );
         assert!(library.left_out.iter().all(|one| !one.what.is_empty()));
         assert!(library.without_meshes().left_out.is_empty());
-    }
-
-    #[test]
-    fn a_folder_of_other_kinds_alone_is_refused_by_the_first_of_them() {
-        let (folder, folders) = folder_with(&[("b.fbx", ""), ("a.blend", ""), ("c.txt", "")]);
-        let error = Library::read(&folders).unwrap_err();
-        let first = folder.path().join("a.blend");
-        assert!(
-            error.to_string().starts_with(first.to_str().unwrap()),
-            "{error}"
-        );
     }
 
     #[cfg(unix)]

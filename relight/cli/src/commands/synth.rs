@@ -49,7 +49,7 @@ enum Product {
 
 #[derive(Args)]
 struct LibraryArguments {
-    /// The file to write, .relib; its table is written next to it as .csv and .md.
+    /// The file to write, .relib; its table is written next to it as .csv.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Folders of .obj, .gltf, .glb and Sweet Home 3D archives (.sh3f), with their subfolders.

@@ -20,6 +20,14 @@ impl Extent {
         [self.width, self.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX))
     }
 
+    /// This size, or the same shape with so many pixels along the longer side if that is less.
+    #[must_use]
+    pub fn at_most(self, longest: usize) -> Self {
+        let own = self.width.max(self.height).max(1);
+        let side = |side: usize| (side * longest.min(own) / own).max(1);
+        Self::new(side(self.width), side(self.height))
+    }
+
     /// How many pixels there are.
     pub const fn pixels(self) -> usize {
         self.width * self.height

@@ -20,4 +20,4 @@ pub use extent::Extent;
 pub use planes::Planes;
 pub use png_rows::{encode_png, encode_png_of};
 pub(crate) use resize::area_shares;
-pub use resize::{Part, beside};
+pub use resize::{Part, beside, connected_parts, reached};

@@ -134,6 +134,33 @@ pub fn beside(extent: Extent, at: usize) -> [Option<usize>; 4] {
     ]
 }
 
+/// The open pixels that are reached from one over their sides; they are closed then.
+pub fn reached(extent: Extent, from: usize, open: &mut [bool]) -> Vec<usize> {
+    let mut found = Vec::new();
+    let mut reach = |at: usize, found: &mut Vec<usize>| {
+        if std::mem::take(&mut open[at]) {
+            found.push(at);
+        }
+    };
+    reach(from, &mut found);
+    let mut next = 0;
+    while let Some(&at) = found.get(next) {
+        next += 1;
+        for other in beside(extent, at).into_iter().flatten() {
+            reach(other, &mut found);
+        }
+    }
+    found
+}
+
+/// The parts of the open pixels that hang together, in the order of their first pixels.
+pub fn connected_parts(extent: Extent, mut open: Vec<bool>) -> Vec<Vec<usize>> {
+    (0..open.len())
+        .map(|at| reached(extent, at, &mut open))
+        .filter(|part| !part.is_empty())
+        .collect()
+}
+
 /// For each of `to` pixels of a line: the source pixels of a line of `from`, with weights.
 fn taps(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     if to <= from {

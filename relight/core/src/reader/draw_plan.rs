@@ -1,7 +1,5 @@
 //! The order in which samples are drawn. Knows their number and not their content.
 
-use std::ops::Range;
-
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
@@ -135,13 +133,12 @@ impl DrawPlan {
             Pcg64::seed_from_u64(seed)
         });
         let batch = self.batch.max(1);
-        let groups = match self.draw {
-            Draw::Neighbours => Groups::runs(turns, batch, random.as_mut()),
-            Draw::Mixed => Groups::mixed(turns, batch, random.as_mut()),
+        let batches = match self.draw {
+            Draw::Neighbours => neighbours(turns, batch, random.as_mut()),
+            Draw::Mixed => mixed(turns, batch, random.as_mut()),
         };
         let mut drawn = 0;
-        (0..groups.count()).filter_map(move |group| {
-            let mut samples = groups.samples(group);
+        batches.into_iter().filter_map(move |mut samples| {
             let start = drawn;
             drawn += samples.len() as u64;
             let over = skip.saturating_sub(start).min(samples.len() as u64);
@@ -155,88 +152,41 @@ impl DrawPlan {
     }
 }
 
-/// The batches of an epoch, kept small: a data set of 750 000 images has 62 500.
-enum Groups {
-    /// Neighbours: where each begins, how many samples it has, and how many its turn has.
-    Runs(Vec<Run>),
-    /// All samples; each batch takes the next ones.
-    Mixed { samples: Vec<SampleId>, batch: u32 },
-}
-
-struct Run {
-    start: SampleId,
-    length: u32,
-    turn_length: u32,
-}
-
-impl Groups {
-    fn runs(turns: &[u32], batch: u32, mut random: Option<&mut Pcg64>) -> Self {
-        let mut runs = Vec::new();
-        for (turn, &turn_length) in (0..).zip(turns) {
-            let offset = random
-                .as_deref_mut()
-                .map_or(0, |random| below(random, u64::from(turn_length)) as u32);
-            for begin in (0..turn_length).step_by(batch as usize) {
-                let position = (u64::from(begin) + u64::from(offset)) % u64::from(turn_length);
-                runs.push(Run {
-                    start: SampleId {
-                        turn,
-                        position: position as u32,
-                    },
-                    length: batch.min(turn_length - begin),
-                    turn_length,
-                });
-            }
-        }
-        if let Some(random) = random {
-            shuffle(&mut runs, random);
-        }
-        Self::Runs(runs)
-    }
-
-    fn mixed(turns: &[u32], batch: u32, random: Option<&mut Pcg64>) -> Self {
-        let all = (0..).zip(turns);
-        let mut samples: Vec<SampleId> = all
-            .flat_map(|(turn, &length)| {
-                (0..length).map(move |position| SampleId { turn, position })
-            })
-            .collect();
-        if let Some(random) = random {
-            shuffle(&mut samples, random);
-        }
-        Self::Mixed { samples, batch }
-    }
-
-    fn count(&self) -> usize {
-        match self {
-            Self::Runs(runs) => runs.len(),
-            Self::Mixed { samples, batch } => samples.len().div_ceil(*batch as usize),
-        }
-    }
-
-    fn samples(&self, group: usize) -> Vec<SampleId> {
-        match self {
-            Self::Runs(runs) => runs[group].samples(),
-            Self::Mixed { samples, batch } => {
-                let first = group * *batch as usize;
-                let all: Range<usize> = first..samples.len().min(first + *batch as usize);
-                samples[all].to_vec()
-            }
-        }
-    }
-}
-
-impl Run {
-    fn samples(&self) -> Vec<SampleId> {
-        let SampleId { turn, position } = self.start;
-        let at = |step| (u64::from(position) + u64::from(step)) % u64::from(self.turn_length);
-        (0..self.length)
-            .map(|step| SampleId {
+/// The batches of [`Draw::Neighbours`].
+fn neighbours(turns: &[u32], batch: u32, mut random: Option<&mut Pcg64>) -> Vec<Vec<SampleId>> {
+    let mut batches = Vec::new();
+    for (turn, &length) in (0..).zip(turns) {
+        let offset = random
+            .as_deref_mut()
+            .map_or(0, |random| below(random, u64::from(length)));
+        let sample = |step: u32| {
+            let position = (u64::from(step) + offset) % u64::from(length);
+            SampleId {
                 turn,
-                position: at(step) as u32,
-            })
-            .collect()
+                position: position as u32,
+            }
+        };
+        for begin in (0..length).step_by(batch as usize) {
+            let end = length.min(begin.saturating_add(batch));
+            batches.push((begin..end).map(sample).collect());
+        }
     }
+    if let Some(random) = random {
+        shuffle(&mut batches, random);
+    }
+    batches
+}
+
+/// The batches of [`Draw::Mixed`].
+fn mixed(turns: &[u32], batch: u32, random: Option<&mut Pcg64>) -> Vec<Vec<SampleId>> {
+    let all = (0..).zip(turns);
+    let mut samples: Vec<SampleId> = all
+        .flat_map(|(turn, &length)| (0..length).map(move |position| SampleId { turn, position }))
+        .collect();
+    if let Some(random) = random {
+        shuffle(&mut samples, random);
+    }
+    samples.chunks(batch as usize).map(<[_]>::to_vec).collect()
 }
 
 /// Fisher and Yates.

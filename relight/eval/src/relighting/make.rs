@@ -2,9 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fs;
-use std::io;
 use std::path::Path;
-use std::process;
 
 use glam::Vec3;
 use rand_pcg::Pcg64;
@@ -20,7 +18,9 @@ use crate::{EvalError, EvalProgress};
 use relight_core::files::write_png;
 use relight_core::image::{Depth, Rgb};
 use relight_core::light::Order;
-use relight_synth::{BlinnPhong, GBuffer, Library, Lighting, Material, Recipe, Shaded, stream};
+use relight_synth::{
+    BlinnPhong, GBuffer, Library, Lighting, Material, Recipe, SampleFolder, Shaded, stream,
+};
 
 /// Mean irradiance over all normals under each light: white then has half the value that clips.
 const IRRADIANCE: f32 = 0.5;
@@ -114,38 +114,13 @@ impl Origin {
     const FILE: &str = "recipe.json";
 
     fn new(recipe: &RelightingRecipe, library: &Library) -> Self {
-        let panoramas = &library.panoramas;
-        let names = (0..panoramas.len()).filter_map(|number| panoramas.name(number));
         Self {
             lights: recipe.lights,
             size: recipe.size,
             seed: recipe.seed,
             shadows: recipe.shadows,
-            meshes: library
-                .meshes
-                .iter()
-                .map(|(file, _)| file.clone())
-                .collect(),
-            panoramas: names.map(str::to_owned).collect(),
-        }
-    }
-
-    /// Writes itself into the folder, or compares itself with the existing file.
-    fn describe(&self, out: &Path) -> Result<(), EvalError> {
-        let path = out.join(Self::FILE);
-        match fs::read(&path) {
-            Ok(bytes) if serde_json::from_slice(&bytes).is_ok_and(|there: Self| there == *self) => {
-                Ok(())
-            }
-            Err(error)
-                if error.kind() == io::ErrorKind::NotFound
-                    && !out.join(object_folder(0)).exists() =>
-            {
-                write_json(&path, self)
-            }
-            _ => Err(EvalError::OtherSettings {
-                path: out.to_owned(),
-            }),
+            meshes: library.mesh_names(),
+            panoramas: library.panoramas.names(),
         }
     }
 }
@@ -164,9 +139,9 @@ pub fn make_relighting(
 ) -> Result<(), EvalError> {
     recipe.synth().check()?;
     let lightings = recipe.lightings(library);
-    make_folder(out)?;
-    Origin::new(recipe, library).describe(out)?;
-    make_folder(&out.join("lights"))?;
+    let folder = SampleFolder::open(out, Origin::FILE, &Origin::new(recipe, library))?;
+    let lights = out.join("lights");
+    fs::create_dir_all(&lights).map_err(EvalError::write(&lights))?;
     for (number, (_, lighting)) in lightings.iter().enumerate() {
         let path = light_file(out, number);
         let text = lighting
@@ -177,7 +152,7 @@ pub fn make_relighting(
     let objects = (0..recipe.objects)
         .into_par_iter()
         .map(|number| {
-            let entry = make_object(recipe, library, &lightings, out, number)?;
+            let entry = make_object(recipe, library, &lightings, &folder, number)?;
             progress(recipe.objects);
             Ok(entry)
         })
@@ -200,7 +175,7 @@ fn make_object(
     recipe: &RelightingRecipe,
     library: &Library,
     lightings: &[(String, Lighting)],
-    out: &Path,
+    folder: &SampleFolder,
     number: usize,
 ) -> Result<ObjectEntry, EvalError> {
     let synth = recipe.synth();
@@ -215,8 +190,8 @@ fn make_object(
         reflectance: gloss.reflectance.to_array(),
         smoothness: gloss.exponent,
     };
-    let place = out.join(object_folder(number));
-    if place.is_dir() {
+    let name = object_folder(number);
+    if folder.has(&name) {
         return Ok(entry);
     }
     let view = synth.view(&object, &mesh, number as u64);
@@ -225,17 +200,17 @@ fn make_object(
         gloss: Some(gloss),
         ..material
     };
-    let partial = out.join(format!(".{number:03}.{}.partial", process::id()));
-    make_folder(&partial)?;
-    write_truth(view.scene.buffer(), &material, &partial)?;
-    for (light, (_, lighting)) in lightings.iter().enumerate() {
-        let seed = stream(own, light as u64);
-        let shaded = view
-            .scene
-            .light(&material, lighting, &library.panoramas, seed);
-        write_images(view.scene.buffer(), &material, &shaded, light, &partial)?;
-    }
-    fs::rename(&partial, &place).map_err(EvalError::write(&place))?;
+    folder.write(&name, |place| {
+        write_truth(view.scene.buffer(), &material, place)?;
+        for (light, (_, lighting)) in lightings.iter().enumerate() {
+            let seed = stream(own, light as u64);
+            let shaded = view
+                .scene
+                .light(&material, lighting, &library.panoramas, seed);
+            write_images(view.scene.buffer(), &material, &shaded, light, place)?;
+        }
+        Ok::<_, EvalError>(())
+    })?;
     Ok(entry)
 }
 
@@ -281,10 +256,6 @@ fn write_images(
         write_png(&folder.join(part.file(light)), &image, Depth::Eight)?;
     }
     Ok(())
-}
-
-fn make_folder(path: &Path) -> Result<(), EvalError> {
-    fs::create_dir_all(path).map_err(EvalError::write(path))
 }
 
 /// Uniform in 0..1, 1 left out.

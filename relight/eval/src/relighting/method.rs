@@ -45,58 +45,49 @@ impl RelightMethod<'_> {
         }
     }
 
-    /// What all lights share.
+    /// The object under the light of a number, sRGB, 0 outside the object. What all lights share is made once.
     pub(super) fn prepare<'a>(
         &'a self,
         set: &'a RelightingSet,
         object: &'a Object,
         part: Part,
     ) -> Result<Relight<'a>, EvalError> {
-        let rendered = |surface: Surface, form| {
+        let own = move |image: &Planes<3>| cut_out(image, &object.mask);
+        let rendered = move |surface: Surface, form| {
             let surface = match part {
                 Part::Full => surface,
                 Part::Diffuse => surface.with_gloss(None)?,
             };
-            Ok(Relight::Rendered {
-                set,
-                object,
-                surface: Box::new(surface),
-                form,
-            })
+            let relight: Relight<'a> =
+                Box::new(move |light| Ok(own(&render(&surface, &set.lights()[light], form)?)));
+            Ok(relight)
         };
         match self {
-            Self::Naive => Ok(Relight::Same(set.image(object, object.input, part)?)),
+            Self::Naive => {
+                let image = set.image(object, object.input, part)?;
+                Ok(Box::new(move |_| Ok(image.clone())))
+            }
             Self::Oracle(form) => rendered(object.surface.clone(), *form),
-            Self::Predictions(predictions) => Ok(Relight::Files {
-                predictions,
-                object,
-                part,
-            }),
+            Self::Predictions(predictions) => Ok(Box::new(move |light| {
+                let path = predictions.file(&object.name, &part.file(light));
+                Ok(own(&read_image(path, object.surface.extent())?))
+            })),
             Self::Photograph(decomposer) => {
-                let photo = SourcePhotograph::new(set, object, part)?;
-                let mask = &photo.mask;
-                let relightable = RelightableObject::new(
-                    &photo.picture,
-                    mask,
-                    Some(mask),
-                    decomposer,
-                    &photo.options,
-                );
-                let relightable =
-                    Box::new(relightable.map_err(EvalError::sample(&object.name, NOT_RELIT))?);
-                Ok(Relight::RelightableObject {
-                    set,
-                    object,
-                    photo,
-                    relightable,
-                })
+                let (picture, mask, options) = photograph(set, object, part)?;
+                let made =
+                    RelightableObject::new(&picture, &mask, Some(&mask), decomposer, &options);
+                let made = made.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
+                Ok(Box::new(move |light| {
+                    let new = &set.lights()[light];
+                    let exposure = mean_irradiance(&made.light) / mean_irradiance(new);
+                    let new = new.clone().tinted([f64::from(exposure); 3]);
+                    let colours = made.relit(&new, &MaterialChange::default());
+                    let colours = colours.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
+                    Ok(own(&shown(made.in_place(&picture, &colours))))
+                }))
             }
             Self::Maps(decomposer) => {
-                let SourcePhotograph {
-                    picture,
-                    mask,
-                    options,
-                } = SourcePhotograph::new(set, object, part)?;
+                let (picture, mask, options) = photograph(set, object, part)?;
                 let found = decomposer.decompose(&picture, &mask, &options);
                 let found = found.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
                 let white = mean_irradiance(&set.lights()[object.input]);
@@ -106,34 +97,30 @@ impl RelightMethod<'_> {
     }
 }
 
-/// The image that is relit, as a photograph.
-pub(super) struct SourcePhotograph {
-    picture: Rgb<Linear>,
-    mask: Planes<1>,
-    options: DecomposeOptions,
-}
+/// An object under the light of a number.
+pub(super) type Relight<'a> = Box<dyn Fn(usize) -> Result<Planes<3>, EvalError> + 'a>;
 
-impl SourcePhotograph {
-    fn new(set: &RelightingSet, object: &Object, part: Part) -> Result<Self, EvalError> {
-        let image = set.image(object, object.input, part)?;
-        let mask = object
-            .mask
-            .iter()
-            .map(|&inside| f32::from(u8::from(inside)));
-        let mask = Planes::from_planes(image.extent(), [mask.collect()])?;
-        let specular = match part {
-            Part::Diffuse => SpecularGate::Off,
-            Part::Full => SpecularGate::On,
-        };
-        Ok(Self {
-            picture: Rgb::<Srgb>::new(image).to_linear(),
-            mask,
-            options: DecomposeOptions {
-                specular,
-                ..DecomposeOptions::default()
-            },
-        })
-    }
+/// The image that is relit as a photograph, its mask, and how it is decomposed.
+fn photograph(
+    set: &RelightingSet,
+    object: &Object,
+    part: Part,
+) -> Result<(Rgb<Linear>, Planes<1>, DecomposeOptions), EvalError> {
+    let image = set.image(object, object.input, part)?;
+    let mask = object
+        .mask
+        .iter()
+        .map(|&inside| f32::from(u8::from(inside)));
+    let mask = Planes::from_planes(image.extent(), [mask.collect()])?;
+    let specular = match part {
+        Part::Diffuse => SpecularGate::Off,
+        Part::Full => SpecularGate::On,
+    };
+    let options = DecomposeOptions {
+        specular,
+        ..DecomposeOptions::default()
+    };
+    Ok((Rgb::<Srgb>::new(image).to_linear(), mask, options))
 }
 
 /// The maps of a photograph in the units of the set, where the mean irradiance of its light is known.
@@ -152,73 +139,6 @@ fn surface_of(found: Decomposition, irradiance: f32) -> Result<Surface, EvalErro
 fn mean_irradiance(light: &ShLight) -> f32 {
     let first = light.coefficients()[0].iter().sum::<f64>() / 3.0;
     (first * PI.sqrt() / 2.0) as f32
-}
-
-/// A method for one object.
-pub(super) enum Relight<'a> {
-    /// One image for all lights.
-    Same(Planes<3>),
-    /// Maps, rendered.
-    Rendered {
-        set: &'a RelightingSet,
-        object: &'a Object,
-        surface: Box<Surface>,
-        form: SpecularForm,
-    },
-    /// Images that were predicted.
-    Files {
-        predictions: &'a Predictions,
-        object: &'a Object,
-        part: Part,
-    },
-    /// A photograph's object.
-    RelightableObject {
-        set: &'a RelightingSet,
-        object: &'a Object,
-        photo: SourcePhotograph,
-        relightable: Box<RelightableObject>,
-    },
-}
-
-impl Relight<'_> {
-    /// The object under a light, sRGB, 0 outside the object.
-    pub(super) fn image(&self, light: usize) -> Result<Planes<3>, EvalError> {
-        match self {
-            Self::Same(image) => Ok(image.clone()),
-            Self::Rendered {
-                set,
-                object,
-                surface,
-                form,
-            } => {
-                let image = render(surface, &set.lights()[light], *form)?;
-                Ok(cut_out(&image, &object.mask))
-            }
-            Self::Files {
-                predictions,
-                object,
-                part,
-            } => {
-                let path = predictions.file(&object.name, &part.file(light));
-                let image = read_image(path, object.surface.extent())?;
-                Ok(cut_out(&image, &object.mask))
-            }
-            Self::RelightableObject {
-                set,
-                object,
-                photo,
-                relightable,
-            } => {
-                let new = &set.lights()[light];
-                let exposure = mean_irradiance(&relightable.light) / mean_irradiance(new);
-                let new = new.clone().tinted([f64::from(exposure); 3]);
-                let colours = relightable.relit(&new, &MaterialChange::default());
-                let colours = colours.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
-                let image = shown(relightable.in_place(&photo.picture, &colours));
-                Ok(cut_out(&image, &object.mask))
-            }
-        }
-    }
 }
 
 fn render(surface: &Surface, light: &ShLight, form: SpecularForm) -> Result<Planes<3>, EvalError> {

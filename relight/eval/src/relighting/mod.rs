@@ -62,7 +62,7 @@ fn score(
         let relight = method.prepare(set, object, part)?;
         for light in object.targets(set) {
             let truth = set.image(object, light, part)?;
-            let found = relight.image(light)?;
+            let found = relight(light)?;
             for ((mask, _), sum) in rules.iter().zip(&mut sums) {
                 let (mse, dssim) = compare(object, &truth, &found, mask)?;
                 sum.0 += mse;

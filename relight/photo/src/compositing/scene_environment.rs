@@ -170,7 +170,17 @@ impl SceneEnvironment {
     /// How far the camera of a scene looks down on the ground of its objects, degrees: as far as it is given, or as the first
     /// object's place says.
     pub fn ground_tilt(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
-        scene.tilt.unwrap_or_else(|| tilt_of(scene, background))
+        if let Some(tilt) = scene.tilt {
+            return tilt;
+        }
+        let (SceneBackground::Panorama(_), Some(object)) = (background, scene.objects.first())
+        else {
+            return TILT;
+        };
+        let [width, height] = scene.size.map(f64::from);
+        let tangent = (scene.fov / 2.0).to_radians().tan();
+        let below = (object.at[1] - 0.5) * height * 2.0 * tangent / width.max(height);
+        (scene.down + below.atan().to_degrees()).clamp(TILTS.0, TILTS.1)
     }
 
     /// The photograph of an object no larger than it has to be for its size in the scene.
@@ -198,7 +208,7 @@ impl SceneEnvironment {
 
     /// The visible part of a panorama that has rotated by so many radians, at its exposure.
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
-        shown(view, panorama, turn, self.panorama_scale)
+        view.exposed(panorama, turn, self.panorama_scale)
     }
 }
 
@@ -207,10 +217,6 @@ fn mean_colour(light: &ShLight) -> [f64; 3] {
     let mean = light.coefficients().first().copied().unwrap_or([1.0; 3]);
     let grey = mean.iter().sum::<f64>() / 3.0;
     mean.map(|channel| channel / grey.max(f64::MIN_POSITIVE))
-}
-
-fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
-    view.exposed(panorama, turn, scale)
 }
 
 /// A panorama no larger than shadows need it: it is turned and looked at again and again.
@@ -237,24 +243,13 @@ fn exposed(
         scene.fov,
         scene.down,
     );
-    let seen = shown(&view, panorama, 0.0, scale);
+    let seen = view.exposed(panorama, 0.0, scale);
     let found = if scene.matches {
         PanoramaExposure::new(&seen, light)
     } else {
         PanoramaExposure::fixed(&seen, 0.0)
     };
     found.brighter(&seen, scene.exposure)
-}
-
-/// How far the camera looks down on the ground of the first object, degrees.
-fn tilt_of(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
-    let (SceneBackground::Panorama(_), Some(object)) = (background, scene.objects.first()) else {
-        return TILT;
-    };
-    let [width, height] = scene.size.map(f64::from);
-    let tangent = (scene.fov / 2.0).to_radians().tan();
-    let below = (object.at[1] - 0.5) * height * 2.0 * tangent / width.max(height);
-    (scene.down + below.atan().to_degrees()).clamp(TILTS.0, TILTS.1)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use image::RgbImage;
 
 use super::crop::inside;
-use relight_core::image::{Extent, Planes, beside};
+use relight_core::image::{Planes, beside, connected_parts, reached};
 use relit_data::geometry::Rect;
 use relit_grabcut::{MaskError, SegmentSettings, segment};
 
@@ -77,55 +77,22 @@ pub(super) fn before_black(encoded: &Planes<3>) -> Result<Planes<1>, NoObject> {
     if (black as f64) < BLACK_EDGE * edge.len() as f64 {
         return Err(NoObject::Background);
     }
-    let mut seen = vec![false; extent.pixels()];
-    for at in edge.into_iter().filter(|&at| is_black(at)) {
-        grow(extent, at, &mut seen, is_black);
-    }
-    // Every pixel of the background has been seen now, and none of the object.
-    let mut largest: Vec<usize> = Vec::new();
-    for at in 0..extent.pixels() {
-        if !seen[at] {
-            let part = grow(extent, at, &mut seen, |_| true);
-            if part.len() > largest.len() {
-                largest = part;
-            }
+    let mut open: Vec<bool> = (0..extent.pixels()).map(is_black).collect();
+    let mut is_object = vec![true; extent.pixels()];
+    for from in edge {
+        for at in reached(extent, from, &mut open) {
+            is_object[at] = false;
         }
     }
-    if largest.is_empty() {
-        return Err(NoObject::Black);
-    }
+    // The first of those that are equally large.
+    let parts = connected_parts(extent, is_object).into_iter().rev();
+    let largest = parts.max_by_key(Vec::len).ok_or(NoObject::Black)?;
     let mut mask = Planes::zeros(extent);
     let [plane] = mask.planes_mut();
     for at in largest {
         plane[at] = 1.0;
     }
     Ok(mask)
-}
-
-/// The pixels that are reached from one over their sides, as far as they are `wanted` and were not seen;
-/// they are seen then.
-fn grow(
-    extent: Extent,
-    from: usize,
-    seen: &mut [bool],
-    wanted: impl Fn(usize) -> bool,
-) -> Vec<usize> {
-    if seen[from] {
-        return Vec::new();
-    }
-    seen[from] = true;
-    let mut found = vec![from];
-    let mut next = 0;
-    while let Some(&at) = found.get(next) {
-        next += 1;
-        for other in beside(extent, at).into_iter().flatten() {
-            if !seen[other] && wanted(other) {
-                seen[other] = true;
-                found.push(other);
-            }
-        }
-    }
-    found
 }
 
 /// Whether a mask is nowhere at least one half.

@@ -153,12 +153,11 @@ impl Photo {
     /// The photograph, reduced to a longest side.
     #[must_use]
     pub fn at_most(mut self, longest: usize) -> Self {
-        let Extent { width, height } = self.picture.planes().extent();
-        if longest >= width.max(height) {
+        let own = self.picture.planes().extent();
+        let extent = own.at_most(longest);
+        if extent == own {
             return self;
         }
-        let side = |pixels: usize| (pixels * longest / width.max(height)).max(1);
-        let extent = Extent::new(side(width), side(height));
         self.picture = Rgb::new(self.picture.planes().resized(extent));
         let share = self.mask.resized(extent);
         self.mask = share.map(|m| f32::from(u8::from(m >= 0.5)));

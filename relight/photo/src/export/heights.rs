@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, SQRT_2};
 
-use relight_core::image::{Extent, beside};
+use relight_core::image::{Extent, beside, connected_parts};
 use relight_core::light::{Normals, YUp};
 
 use crate::relighting::HeightSolver;
@@ -28,52 +28,20 @@ pub(super) fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
         rounds: ROUNDS * longest,
     };
     let mut heights = solver.heights(normals, inside);
-    Grid { extent, inside }.settle(&mut heights);
+    settle(&mut heights, extent, inside);
     heights
 }
 
-/// Pixels and those of them that belong to the object.
-struct Grid<'a> {
-    extent: Extent,
-    inside: &'a [bool],
-}
-
-impl Grid<'_> {
-    /// The neighbours of a pixel inside that are inside too.
-    fn neighbours(&self, at: usize) -> impl Iterator<Item = usize> + '_ {
-        let around = beside(self.extent, at).into_iter().flatten();
-        around.filter(|&other| self.inside[other])
-    }
-
-    /// Brings the rim of each part that hangs together to 0 in the mean.
-    fn settle(&self, heights: &mut [f32]) {
-        let mut is_seen: Vec<bool> = self.inside.iter().map(|inside| !inside).collect();
-        for first in 0..heights.len() {
-            if is_seen[first] {
-                continue;
-            }
-            is_seen[first] = true;
-            let mut part = vec![first];
-            let mut next = 0;
-            while next < part.len() {
-                for other in self.neighbours(part[next]) {
-                    if !is_seen[other] {
-                        is_seen[other] = true;
-                        part.push(other);
-                    }
-                }
-                next += 1;
-            }
-            let is_rim = |at: usize| self.neighbours(at).count() < 4;
-            let rim: Vec<f32> = part
-                .iter()
-                .filter(|&&at| is_rim(at))
-                .map(|&at| heights[at])
-                .collect();
-            let level = rim.iter().sum::<f32>() / rim.len().max(1) as f32;
-            for at in part {
-                heights[at] -= level;
-            }
+/// Brings the rim of each part that hangs together to 0 in the mean.
+fn settle(heights: &mut [f32], extent: Extent, inside: &[bool]) {
+    let neighbours = |at: usize| beside(extent, at).into_iter().flatten();
+    let is_rim = |at: usize| neighbours(at).filter(|&other| inside[other]).count() < 4;
+    for part in connected_parts(extent, inside.to_vec()) {
+        let rim = part.iter().filter(|&&at| is_rim(at));
+        let rim: Vec<f32> = rim.map(|&at| heights[at]).collect();
+        let level = rim.iter().sum::<f32>() / rim.len().max(1) as f32;
+        for at in part {
+            heights[at] -= level;
         }
     }
 }

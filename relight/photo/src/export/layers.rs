@@ -84,15 +84,7 @@ fn encode(
 /// The heights of all pixels, in pixels.
 fn heights(object: &CapturedObject) -> Vec<f32> {
     let extent = object.extent();
-    let longest = extent.width.max(extent.height);
-    let grid = if longest > MAX_SIDE {
-        relight_core::image::Extent::new(
-            (extent.width * MAX_SIDE / longest).max(1),
-            (extent.height * MAX_SIDE / longest).max(1),
-        )
-    } else {
-        extent
-    };
+    let grid = extent.at_most(MAX_SIDE);
     let inside: Vec<bool> = object
         .alpha()
         .resized(grid)

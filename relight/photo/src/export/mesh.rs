@@ -55,9 +55,24 @@ fn grid_mesh(object: &CapturedObject, side: usize) -> ObjectMesh {
     let grid = Extent::new(cells(picture.width), cells(picture.height));
     let alpha = object.alpha().resized(grid);
     let inside: Vec<bool> = alpha.plane(0).iter().map(|&alpha| alpha >= 0.5).collect();
-    let used = beside_or_inside(grid, &inside);
     let normals = Normals::<YUp>::new(object.surface().normals().planes().resized(grid));
     let normals = normals.completed(&inside);
+
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    for row in 1..grid.height {
+        for column in 1..grid.width {
+            let at = row * grid.width + column;
+            let corners = [at - grid.width - 1, at - grid.width, at - 1, at];
+            if corners.iter().any(|&at| inside[at]) {
+                let [a, b, c, d] = corners.map(|at| at as u32);
+                triangles.extend([[a, c, b], [b, c, d]]);
+            }
+        }
+    }
+    let mut used = vec![false; grid.pixels()];
+    for &corner in triangles.as_flattened() {
+        used[corner as usize] = true;
+    }
     let heights = extended(grid, integrated(&normals, &inside), &inside, &used);
 
     let sides = sides(picture);
@@ -73,55 +88,14 @@ fn grid_mesh(object: &CapturedObject, side: usize) -> ObjectMesh {
         positions.push(place(uv, sides, heights[at] * pixel));
         texture.push(uv);
     }
-    let mut triangles = Vec::new();
-    for row in 1..grid.height {
-        for column in 1..grid.width {
-            let at = row * grid.width + column;
-            let corners = [at - grid.width - 1, at - grid.width, at - 1, at];
-            if corners.iter().all(|&at| used[at]) && corners.iter().any(|&at| inside[at]) {
-                let [a, b, c, d] = corners.map(|at| numbers[at]);
-                triangles.extend([[a, c, b], [b, c, d]]);
-            }
-        }
+    for corner in triangles.as_flattened_mut() {
+        *corner = numbers[*corner as usize];
     }
     ObjectMesh {
         positions,
         texture,
         triangles,
     }
-    .without_lonely_vertices()
-}
-
-impl ObjectMesh {
-    /// The same mesh without vertices that no triangle has.
-    fn without_lonely_vertices(self) -> Self {
-        let mut numbers = vec![u32::MAX; self.positions.len()];
-        for &corner in self.triangles.iter().flatten() {
-            numbers[corner as usize] = 0;
-        }
-        let used = numbers.iter_mut().filter(|number| **number == 0);
-        for (count, number) in (0..).zip(used) {
-            *number = count;
-        }
-        let is_kept = |at: &usize| numbers[*at] != u32::MAX;
-        let kept: Vec<usize> = (0..numbers.len()).filter(is_kept).collect();
-        Self {
-            positions: kept.iter().map(|&at| self.positions[at]).collect(),
-            texture: kept.iter().map(|&at| self.texture[at]).collect(),
-            triangles: self
-                .triangles
-                .iter()
-                .map(|corners| corners.map(|corner| numbers[corner as usize]))
-                .collect(),
-        }
-    }
-}
-
-/// The cells that are inside or touch one that is, also at a corner.
-fn beside_or_inside(grid: Extent, inside: &[bool]) -> Vec<bool> {
-    around(grid)
-        .map(|mut around| around.any(|at| inside[at]))
-        .collect()
 }
 
 /// Heights, with those of the neighbours inside, in the mean, for cells that are used and not inside.

@@ -121,10 +121,47 @@ impl fmt::Display for FrameRate {
 #[derive(Debug)]
 pub struct MovieWriter {
     path: PathBuf,
-    partial: Option<Partial>,
     extent: Extent,
-    program: Child,
+    /// Dropped before its file is removed.
+    program: Ffmpeg,
+    partial: Partial,
+}
+
+/// `ffmpeg` under way; it ends when this is dropped.
+#[derive(Debug)]
+pub(super) struct Ffmpeg {
+    pub(super) child: Child,
+    /// Reads what it complains of, so that it is not blocked by that.
     errors: Option<JoinHandle<Option<String>>>,
+}
+
+impl Ffmpeg {
+    pub(super) fn start(command: &mut Command) -> Result<Self, MovieError> {
+        let mut child = command
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(MovieError::NoProgram)?;
+        let pipe = child.stderr.take();
+        let errors = pipe.map(|pipe| thread::spawn(|| last_line(pipe)));
+        Ok(Self { child, errors })
+    }
+
+    /// Whether it ends well.
+    pub(super) fn is_done(&mut self) -> bool {
+        self.child.wait().is_ok_and(|status| status.success())
+    }
+
+    /// Waits for its end, and its last complaint.
+    pub(super) fn said(&mut self) -> Option<String> {
+        self.errors.take()?.join().ok()?
+    }
+}
+
+impl Drop for Ffmpeg {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 impl MovieWriter {
@@ -157,7 +194,8 @@ impl MovieWriter {
         fs::create_dir_all(path.parent().unwrap_or(Path::new(""))).map_err(not_written(path))?;
         let partial = Partial::create(path).map_err(not_written(path))?;
         let shown = even(extent);
-        let mut program = Command::new("ffmpeg")
+        let mut command = Command::new("ffmpeg");
+        command
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
             .args(["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size"])
             .arg(format!("{}x{}", shown.width, shown.height))
@@ -169,20 +207,12 @@ impl MovieWriter {
             .args(format.arguments())
             .arg(file_url(partial.path()))
             .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(MovieError::NoProgram)?;
-        let errors = program
-            .stderr
-            .take()
-            .map(|pipe| thread::spawn(|| last_line(pipe)));
+            .stdout(Stdio::null());
         Ok(Self {
             path: path.to_owned(),
-            partial: Some(partial),
             extent,
-            program,
-            errors,
+            program: Ffmpeg::start(&mut command)?,
+            partial,
         })
     }
 
@@ -230,7 +260,7 @@ impl MovieWriter {
             ))));
         }
         let bytes = filled_up(frame.planes().to_bytes(), found);
-        let written = match &mut self.program.stdin {
+        let written = match &mut self.program.child.stdin {
             Some(pipe) => pipe.write_all(&bytes),
             None => Ok(()),
         };
@@ -243,26 +273,21 @@ impl MovieWriter {
     /// # Errors
     /// If the program failed, or the file cannot be given its name.
     pub fn finish(mut self) -> Result<(), MovieError> {
-        drop(self.program.stdin.take());
-        let is_done = self.program.wait().is_ok_and(|status| status.success());
-        let said = self.said();
+        drop(self.program.child.stdin.take());
+        let is_done = self.program.is_done();
+        let said = self.program.said();
         // On a full disk ffmpeg says so, ends without an error, and leaves a file that no player opens.
         if !is_done || said.is_some() {
             return Err(self.failed(said));
         }
-        let partial = self.partial.take();
-        let published = partial.map_or(Ok(()), |partial| partial.seal()?.publish());
+        let published = self.partial.seal().and_then(|sealed| sealed.publish());
         published.map_err(not_written(&self.path))
     }
 
     fn failure(&mut self) -> MovieError {
-        drop(self.program.stdin.take());
-        let said = self.said();
+        drop(self.program.child.stdin.take());
+        let said = self.program.said();
         self.failed(said)
-    }
-
-    fn said(&mut self) -> Option<String> {
-        self.errors.take()?.join().ok()?
     }
 
     fn failed(&self, said: Option<String>) -> MovieError {
@@ -271,14 +296,6 @@ impl MovieWriter {
             &self.path,
             format!("could not be written by ffmpeg: {said}"),
         )
-    }
-}
-
-impl Drop for MovieWriter {
-    fn drop(&mut self) {
-        // After `finish` there is no program. The file goes with its name.
-        let _ = self.program.kill();
-        let _ = self.program.wait();
     }
 }
 
@@ -325,7 +342,7 @@ pub(super) fn file_url(path: &Path) -> OsString {
 pub(super) const SILENT: &str = "it ended without a message";
 
 /// Reads all that a program writes, and keeps its last line.
-pub(super) fn last_line(mut pipe: ChildStderr) -> Option<String> {
+fn last_line(mut pipe: ChildStderr) -> Option<String> {
     let mut bytes = Vec::new();
     // What was read before an error is all there is to say.
     let _ = pipe.read_to_end(&mut bytes);

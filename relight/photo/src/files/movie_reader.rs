@@ -3,14 +3,13 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::thread::{self, JoinHandle};
+use std::process::{Command, Output, Stdio};
 
 use relight_core::image::{Extent, Planes, Rgb, Srgb};
 use relit_data::colour::{ColourFault, ToSrgb, YuvDecoding};
 use serde::Deserialize;
 
-use super::movie::{FrameRate, MovieError, SILENT, file_url, last_line};
+use super::movie::{Ffmpeg, FrameRate, MovieError, SILENT, file_url};
 
 /// The most pixels of a video's frame.
 const MAX_PIXELS: usize = 1 << 26;
@@ -38,8 +37,7 @@ pub struct MovieReader {
     frame_rate: FrameRate,
     /// The conversion of colours that are not sRGB; frames then come as YUV with 16 bits.
     wide: Option<WideColour>,
-    program: Child,
-    errors: Option<JoinHandle<Option<String>>>,
+    program: Ffmpeg,
 }
 
 impl MovieReader {
@@ -71,7 +69,8 @@ impl MovieReader {
         } else if facts.matrix().is_none() && extent.height > MAX_SD_ROWS {
             scale.push_str(":in_color_matrix=bt709");
         }
-        let mut program = ffmpeg(path)
+        let mut command = ffmpeg(path);
+        command
             .args(["-f", "rawvideo", "-pix_fmt"])
             .arg(if wide.is_some() {
                 "yuv444p16le"
@@ -83,21 +82,13 @@ impl MovieReader {
                 FrameTiming::Even => ["-r".to_owned(), frame_rate.to_string()],
             })
             .args(["-vf", &scale, "pipe:1"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(MovieError::NoProgram)?;
-        let errors = program
-            .stderr
-            .take()
-            .map(|pipe| thread::spawn(|| last_line(pipe)));
+            .stdout(Stdio::piped());
         Ok(Self {
             path: path.to_owned(),
             extent,
             frame_rate,
             wide,
-            program,
-            errors,
+            program: Ffmpeg::start(&mut command)?,
         })
     }
 
@@ -121,7 +112,7 @@ impl MovieReader {
     /// # Errors
     /// If the program fails, or the file ends in the middle of a frame.
     pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, MovieError> {
-        let Some(pipe) = &mut self.program.stdout else {
+        let Some(pipe) = &mut self.program.child.stdout else {
             return Ok(None);
         };
         let sample = if self.wide.is_some() { 2 } else { 1 };
@@ -132,8 +123,7 @@ impl MovieReader {
             return Err(self.failure());
         }
         if bytes.is_empty() {
-            let is_done = self.program.wait().is_ok_and(|status| status.success());
-            return if is_done {
+            return if self.program.is_done() {
                 Ok(None)
             } else {
                 Err(self.failure())
@@ -152,18 +142,11 @@ impl MovieReader {
     }
 
     fn failure(&mut self) -> MovieError {
-        drop(self.program.stdout.take());
+        drop(self.program.child.stdout.take());
         // What is not read any more cannot end by itself.
-        let _ = self.program.kill();
-        let said = self.errors.take().and_then(|thread| thread.join().ok());
-        no_video(&self.path, said.flatten().as_deref().unwrap_or(SILENT))
-    }
-}
-
-impl Drop for MovieReader {
-    fn drop(&mut self) {
-        let _ = self.program.kill();
-        let _ = self.program.wait();
+        let _ = self.program.child.kill();
+        let said = self.program.said();
+        no_video(&self.path, said.as_deref().unwrap_or(SILENT))
     }
 }
 

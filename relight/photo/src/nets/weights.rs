@@ -83,6 +83,14 @@ impl Weights {
             .collect()
     }
 
+    /// The same with `prefix` before all names: one network of several in a file.
+    pub fn prefixed(self, prefix: &str) -> Self {
+        let tensors = self.tensors.into_iter();
+        tensors
+            .map(|(name, tensor)| (format!("{prefix}{name}"), tensor))
+            .collect()
+    }
+
     /// The weights of a graph out of these, whatever wraps their names: PyTorch puts `module.`
     /// before every name of a network that ran on several devices.
     ///

@@ -1,7 +1,7 @@
 //! The sun, or a bare lamp, that is seen in a picture: the only sign of the direction of hard light that needs no
 //! knowledge of the picture's content.
 
-use relight_core::image::{Extent, Planes, beside};
+use relight_core::image::{Extent, Planes, connected_parts};
 
 /// The longer side of the picture that is searched, pixels.
 const LOOK: usize = 256;
@@ -30,10 +30,7 @@ impl SeenSun {
     /// The sun in linear light: one small, round, clipped place in the upper part, in a glow that falls off. `None` if nothing
     /// is like that.
     pub(crate) fn find(picture: &Planes<3>) -> Option<Self> {
-        let Extent { width, height } = picture.extent();
-        let longest = width.max(height).max(1);
-        let side = |side: usize| (side * LOOK.min(longest) / longest).max(1);
-        let small = picture.resized(Extent::new(side(width), side(height)));
+        let small = picture.resized(picture.extent().at_most(LOOK));
         let spots = spots(&small);
         let all: usize = spots.iter().map(Vec::len).sum();
         let largest = spots.into_iter().max_by_key(Vec::len)?;
@@ -111,27 +108,8 @@ impl Spot {
 fn spots(picture: &Planes<3>) -> Vec<Vec<usize>> {
     let extent = picture.extent();
     let [red, green, blue] = picture.planes();
-    let mut open: Vec<bool> = (0..extent.pixels())
-        .map(|at| red[at].min(green[at]).min(blue[at]) >= CLIPPED)
-        .collect();
-    let mut found = Vec::new();
-    for start in 0..open.len() {
-        if !std::mem::take(&mut open[start]) {
-            continue;
-        }
-        let mut spot = vec![start];
-        let mut next = 0;
-        while let Some(&at) = spot.get(next) {
-            next += 1;
-            for other in beside(extent, at).into_iter().flatten() {
-                if std::mem::take(&mut open[other]) {
-                    spot.push(other);
-                }
-            }
-        }
-        found.push(spot);
-    }
-    found
+    let is_clipped = |at: usize| red[at].min(green[at]).min(blue[at]) >= CLIPPED;
+    connected_parts(extent, (0..extent.pixels()).map(is_clipped).collect())
 }
 
 #[cfg(test)]

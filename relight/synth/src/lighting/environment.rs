@@ -107,6 +107,14 @@ impl Panoramas {
         self.entries.get(number).map(|entry| entry.name.as_str())
     }
 
+    /// The names of all.
+    pub fn names(&self) -> Vec<String> {
+        self.entries
+            .iter()
+            .map(|entry| entry.name.clone())
+            .collect()
+    }
+
     /// One of them.
     pub fn get(&self, number: usize) -> Option<&Panorama> {
         self.entries.get(number).map(|entry| &entry.panorama)

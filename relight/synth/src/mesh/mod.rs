@@ -18,7 +18,6 @@ use glam::{Vec2, Vec3};
 use super::SynthError;
 pub(crate) use material::{MeshMaterial, MeshMaterials, PlacedPicture, SurfaceSample};
 pub(crate) use raw::{NO_TEXTURE, RawMesh};
-use relit_data::file_names::has_extension;
 use relit_data::shard::Digest;
 
 /// Most triangles that a mesh may have.
@@ -63,10 +62,6 @@ impl Mesh {
     /// [`SynthError::Unusable`] if the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] if it
     /// cannot be read.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
-        let is_known = has_extension(path, &["obj", "gltf", "glb"]);
-        if !is_known {
-            return Err(SynthError::unusable(path, NOT_READ));
-        }
         let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
         let raw = RawMesh::parsed(path, &bytes);
         raw.and_then(|raw| Self::new(raw, CREASE))

@@ -4,7 +4,7 @@
 use glam::{Affine2, Vec2, Vec3};
 
 use super::material::DULL;
-use super::text::{Statements, keyword, without_comment};
+use super::text::{keyword, statements, without_comment};
 
 /// A material as the file has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +41,7 @@ impl MtlMaterial {
 /// The materials of a file, in their order.
 pub(super) fn materials(text: &str) -> Vec<MtlMaterial> {
     let mut all: Vec<MtlMaterial> = Vec::new();
-    for (_, statement) in Statements::new(text) {
+    for (_, statement) in statements(text) {
         let (key, rest) = keyword(&statement);
         if key.eq_ignore_ascii_case("newmtl") {
             all.push(MtlMaterial {

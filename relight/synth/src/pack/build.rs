@@ -16,7 +16,7 @@ use super::candidates::{Candidate, Candidates};
 use super::codec::{PackedPanorama, decode_mesh, encode_panorama};
 use super::file::{PackedEntry, Parts, encode};
 use super::prepare::{PreparedObject, Reason};
-use super::table::{Row, write_tables};
+use super::table::{Row, write_table};
 use super::{LibraryEntry, UNKNOWN};
 use crate::SynthError;
 use crate::library::SkippedFile;
@@ -65,7 +65,7 @@ impl LibrarySummary {
     }
 }
 
-/// Builds a library and writes it to `out`, with its table as `.csv` and `.md` in the same folder. What cannot be read is left
+/// Builds a library and writes it to `out`, with its table as `.csv` in the same folder. What cannot be read is left
 /// out. `progress` is called with the number of files, and then once a file.
 ///
 /// # Errors
@@ -92,7 +92,7 @@ pub fn build_library(
     let bytes = encode(parts).map_err(SynthError::Refused)?;
     summary.bytes = bytes.len();
     write_whole(out, &bytes).map_err(SynthError::write(out))?;
-    write_tables(out, &rows, &summary)?;
+    write_table(out, &rows)?;
     Ok(summary)
 }
 

@@ -10,7 +10,7 @@
 //! | `orient` | triangles that face one way |
 //! | `codec` | meshes and panoramas as bytes |
 //! | `file` | the file: a zip archive with a catalogue |
-//! | `table` | the table of contents, as `.csv` and `.md` |
+//! | `table` | the table of contents, as `.csv` |
 
 mod build;
 mod candidates;

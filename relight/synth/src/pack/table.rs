@@ -1,12 +1,10 @@
-//! The table of a library: `.csv` with a line for each object and panorama, and `.md` with the facts for model cards.
+//! The table of a library: `.csv` with a line for each object and panorama.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
 use std::path::Path;
 
 use relit_data::durable::write_whole;
 
-use super::{LibraryEntry, LibrarySummary};
+use super::LibraryEntry;
 use crate::SynthError;
 
 const COLUMNS: &str = "kind,name,title,category,author,licence,origin,part,triangles,note\n";
@@ -41,17 +39,10 @@ impl Row {
     }
 }
 
-/// Writes both tables beside a library's file.
-pub(super) fn write_tables(
-    library: &Path,
-    rows: &[Row],
-    summary: &LibrarySummary,
-) -> Result<(), SynthError> {
-    for (extension, text) in [("csv", csv(rows)), ("md", markdown(rows, summary))] {
-        let path = library.with_extension(extension);
-        write_whole(&path, text.as_bytes()).map_err(SynthError::write(&path))?;
-    }
-    Ok(())
+/// Writes the table beside a library's file.
+pub(super) fn write_table(library: &Path, rows: &[Row]) -> Result<(), SynthError> {
+    let path = library.with_extension("csv");
+    write_whole(&path, csv(rows).as_bytes()).map_err(SynthError::write(&path))
 }
 
 fn csv(rows: &[Row]) -> String {
@@ -88,55 +79,6 @@ fn quoted(field: &str) -> String {
     } else {
         field
     }
-}
-
-fn markdown(rows: &[Row], summary: &LibrarySummary) -> String {
-    /// Training, validation, left out, and authors of what is used.
-    #[derive(Default)]
-    struct Group<'a> {
-        counts: [usize; 3],
-        authors: BTreeSet<&'a str>,
-    }
-    let mut groups: BTreeMap<(&str, &str, &str), Group<'_>> = BTreeMap::new();
-    for row in rows {
-        let entry = &row.entry;
-        let key = (row.kind, entry.origin.as_str(), entry.licence.as_str());
-        let group = groups.entry(key).or_default();
-        let place = match row.part() {
-            "training" => 0,
-            "validation" => 1,
-            _ => 2,
-        };
-        group.counts[place] += 1;
-        if !row.is_left_out {
-            group.authors.insert(&entry.author);
-        }
-    }
-    let mut text = "# What the library holds\n\n\
-        | kind | origin | licence | training | validation | left out | authors |\n\
-        | --- | --- | --- | --- | --- | --- | --- |\n"
-        .to_owned();
-    for ((kind, origin, licence), group) in groups {
-        let [training, validation, left_out] = group.counts;
-        let authors: Vec<&str> = group.authors.into_iter().collect();
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "| {kind} | {} | {} | {training} | {validation} | {left_out} | {} |",
-            cell(origin),
-            cell(licence),
-            cell(&authors.join(", "))
-        );
-    }
-    text.push_str("\nLeft out:\n\n");
-    for (reason, count) in &summary.left_out {
-        let _ = writeln!(text, "- {count} {reason}");
-    }
-    text
-}
-
-fn cell(text: &str) -> String {
-    text.replace('|', "\\|").replace(['\r', '\n'], " ")
 }
 
 #[cfg(test)]

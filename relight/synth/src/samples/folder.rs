@@ -7,10 +7,10 @@ use std::process;
 
 use rayon::prelude::*;
 use relit_data::durable::write_whole;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::recipe::Recipe;
-use super::sample::SynthSample;
 use crate::SynthError;
 use crate::library::Library;
 
@@ -32,18 +32,12 @@ struct Origin {
 
 impl Origin {
     fn new(recipe: &Recipe, library: &Library) -> Self {
-        let panoramas = &library.panoramas;
-        let names = (0..panoramas.len()).filter_map(|number| panoramas.name(number));
         Self {
             schema: SCHEMA.to_owned(),
             software: format!("relight {}", env!("CARGO_PKG_VERSION")),
             recipe: recipe.clone(),
-            meshes: library
-                .meshes
-                .iter()
-                .map(|(file, _)| file.clone())
-                .collect(),
-            panoramas: names.map(str::to_owned).collect(),
+            meshes: library.mesh_names(),
+            panoramas: library.panoramas.names(),
             pictures: library.pictures.len(),
         }
     }
@@ -73,7 +67,7 @@ pub fn write_samples(
     progress: &(dyn Fn() + Sync),
 ) -> Result<SynthSummary, SynthError> {
     recipe.check()?;
-    let folder = SampleFolder::open(out, &Origin::new(recipe, library))?;
+    let folder = SampleFolder::open(out, FILE, &Origin::new(recipe, library))?;
     let each = recipe.samples_an_object();
     let objects = count.div_ceil(each);
     (0..objects)
@@ -90,15 +84,24 @@ pub fn write_samples(
         })
 }
 
-/// A folder that this process alone writes into.
-struct SampleFolder {
+/// A folder of samples that this process alone writes into.
+#[derive(Debug)]
+pub struct SampleFolder {
     path: PathBuf,
     /// The lock lives as long as this handle.
     _handle: File,
 }
 
 impl SampleFolder {
-    fn open(path: &Path, origin: &Origin) -> Result<Self, SynthError> {
+    /// Opens a folder, made if missing, which the file `name` describes: it is empty, or its samples are of this origin.
+    ///
+    /// # Errors
+    /// If it holds something else, or is being written.
+    pub fn open<O: Serialize + DeserializeOwned + PartialEq>(
+        path: &Path,
+        name: &str,
+        origin: &O,
+    ) -> Result<Self, SynthError> {
         fs::create_dir_all(path).map_err(SynthError::write(path))?;
         let handle = File::open(path).map_err(SynthError::read(path))?;
         handle.try_lock().map_err(|reason| match reason {
@@ -108,7 +111,7 @@ impl SampleFolder {
             ),
             TryLockError::Error(source) => SynthError::write(path)(source),
         })?;
-        describe(path, origin)?;
+        describe(path, name, origin)?;
         clear_leftovers(path)?;
         Ok(Self {
             path: path.to_owned(),
@@ -127,7 +130,7 @@ impl SampleFolder {
         let mut written = SynthSummary::default();
         let missing: Vec<u64> = numbers
             .filter(|&number| {
-                !self.place(number).is_dir() || {
+                !self.has(&name_of(number)) || {
                     written.kept += 1;
                     progress();
                     false
@@ -142,7 +145,14 @@ impl SampleFolder {
         for of_view in missing.chunk_by(|a, b| a / lightings == b / lightings) {
             let view = recipe.view(&object, &mesh, of_view[0] / lightings);
             for &number in of_view {
-                self.write(&recipe.sample(library, &view, number), number)?;
+                let files = recipe.sample(library, &view, number).files()?;
+                self.write(&name_of(number), |folder| {
+                    for (name, bytes) in &files {
+                        let path = folder.join(name);
+                        fs::write(&path, bytes).map_err(SynthError::write(&path))?;
+                    }
+                    Ok::<_, SynthError>(())
+                })?;
                 written.new += 1;
                 progress();
             }
@@ -150,29 +160,38 @@ impl SampleFolder {
         Ok(written)
     }
 
-    fn write(&self, sample: &SynthSample<'_>, number: u64) -> Result<(), SynthError> {
-        let files = sample.files()?;
+    /// Whether a sample is there, with all its files.
+    pub fn has(&self, sample: &str) -> bool {
+        self.path.join(sample).is_dir()
+    }
+
+    /// Writes a sample, whose folder appears when all its files are in it. `write` is given the folder meanwhile.
+    ///
+    /// # Errors
+    /// Those of `write`, or if a folder cannot be written.
+    pub fn write<E: From<SynthError>>(
+        &self,
+        sample: &str,
+        write: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> Result<(), E> {
         let partial = self
             .path
-            .join(format!(".{number:06}.{}.partial", process::id()));
-        let write = || -> Result<(), SynthError> {
+            .join(format!(".{sample}.{}.partial", process::id()));
+        let written = || {
             fs::create_dir(&partial).map_err(SynthError::write(&partial))?;
-            for (name, bytes) in &files {
-                let path = partial.join(name);
-                fs::write(&path, bytes).map_err(SynthError::write(&path))?;
-            }
-            let place = self.place(number);
-            fs::rename(&partial, &place).map_err(SynthError::write(&place))
+            write(&partial)?;
+            let place = self.path.join(sample);
+            Ok(fs::rename(&partial, &place).map_err(SynthError::write(&place))?)
         };
-        write().inspect_err(|_| {
+        written().inspect_err(|_| {
             // The first error is the one that counts.
             let _ = fs::remove_dir_all(&partial);
         })
     }
+}
 
-    fn place(&self, number: u64) -> PathBuf {
-        self.path.join(format!("{number:06}"))
-    }
+fn name_of(number: u64) -> String {
+    format!("{number:06}")
 }
 
 /// Whether a folder holds samples.
@@ -181,16 +200,20 @@ pub(crate) fn holds_samples(folder: &Path) -> bool {
 }
 
 /// Writes the description, or compares it with the existing one.
-fn describe(folder: &Path, origin: &Origin) -> Result<(), SynthError> {
-    let path = folder.join(FILE);
+fn describe<O: Serialize + DeserializeOwned + PartialEq>(
+    folder: &Path,
+    name: &str,
+    origin: &O,
+) -> Result<(), SynthError> {
+    let path = folder.join(name);
     let there = match fs::read(&path) {
-        Ok(bytes) => serde_json::from_slice::<Origin>(&bytes)
+        Ok(bytes) => serde_json::from_slice::<O>(&bytes)
             .map_err(|fault| SynthError::unusable(&path, format!("is damaged: {fault}")))?,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let mut entries = fs::read_dir(folder).map_err(SynthError::read(folder))?;
             if entries.next().is_some() {
                 let fault = format!(
-                    "is not empty and has no {FILE}: give an empty folder, or one of `relight synth`"
+                    "is not empty and has no {name}: give an empty folder, or one of `relight synth`"
                 );
                 return Err(SynthError::unusable(folder, fault));
             }

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use half::f16;
-use half::slice::HalfFloatSliceExt;
 use relit_data::shard::Digest;
 use serde::{Deserialize, Serialize};
 
@@ -14,12 +13,11 @@ use super::cast::{RadianceTransfer, TransferFinish};
 use super::environment_lights::EnvironmentLights;
 use super::turn_sample::TurnSample;
 use super::views::TransferRecipe;
-use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS};
 use crate::SynthError;
 use crate::library::Library;
 
 /// The format, and what is computed: another number casts all views again.
-const FORMAT: &str = "relight.transfer/1";
+const FORMAT: &str = "relight.transfer/2";
 
 /// Views in a folder.
 #[derive(Debug, Clone)]
@@ -97,6 +95,7 @@ impl TransferCache {
     }
 }
 
+/// A line with the header, the pixels, one half after the other, and the digest of all that.
 fn encode(transfer: &RadianceTransfer) -> Vec<u8> {
     let header = Header {
         format: FORMAT.to_owned(),
@@ -107,34 +106,24 @@ fn encode(transfer: &RadianceTransfer) -> Vec<u8> {
     };
     let mut bytes = serde_json::to_vec(&header).unwrap_or_default();
     bytes.push(b'\n');
-    for pixel in &transfer.pixels {
-        bytes.extend(pixel.to_le_bytes());
+    bytes.extend(transfer.pixels.iter().flat_map(|pixel| pixel.to_le_bytes()));
+    let mirrors = transfer.mirrors.iter().map(|&mirrors| f32::from(mirrors));
+    let mut values: Vec<f32> = mirrors.collect();
+    values.extend(transfer.blocked.as_flattened());
+    values.extend(transfer.bounced.as_flattened());
+    let finishes = transfer.finishes.iter();
+    let finishes = finishes.flat_map(|finish| [&finish.normals, &finish.albedo]);
+    for vectors in std::iter::once(&transfer.towards_eye).chain(finishes) {
+        values.extend(vectors.iter().flat_map(Vec3::to_array));
     }
-    bytes.extend(transfer.mirrors.iter().map(|&mirrors| u8::from(mirrors)));
-    push_halves(&mut bytes, transfer.blocked.as_flattened());
-    push_halves(&mut bytes, transfer.bounced.as_flattened());
-    push_vectors(&mut bytes, &transfer.towards_eye);
-    for finish in &transfer.finishes {
-        push_vectors(&mut bytes, &finish.normals);
-        push_vectors(&mut bytes, &finish.albedo);
-    }
+    bytes.extend(
+        values
+            .into_iter()
+            .flat_map(|value| f16::from_f32(value).to_le_bytes()),
+    );
     let digest = Digest::hash(&bytes).to_string();
     bytes.extend(digest.as_bytes());
     bytes
-}
-
-fn push_halves(bytes: &mut Vec<u8>, values: &[f32]) {
-    bytes.extend(
-        values
-            .iter()
-            .flat_map(|&value| f16::from_f32(value).to_le_bytes()),
-    );
-}
-
-fn push_vectors(bytes: &mut Vec<u8>, vectors: &[Vec3]) {
-    for vector in vectors {
-        push_halves(bytes, &vector.to_array());
-    }
 }
 
 /// `None` if the bytes are not those of a whole file.
@@ -146,69 +135,38 @@ fn decode(bytes: &[u8]) -> Option<RadianceTransfer> {
     }
     let end = bytes.iter().position(|&byte| byte == b'\n')?;
     let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
-    let mut rest = Rest(&bytes[end + 1..]);
     let count = header.pixels;
-    let pixels = rest
-        .take(4 * count)?
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|&bytes| u32::from_le_bytes(bytes))
-        .collect();
-    let mirrors = rest.take(count)?.iter().map(|&byte| byte == 1).collect();
-    let blocked = rest.halves(count * COEFFICIENTS)?;
-    let bounced = rest.halves(count * BOUNCE_COEFFICIENTS)?;
-    let towards_eye = rest.vectors(count)?;
-    let finishes = (0..header.finishes)
-        .map(|_| {
-            Some(TransferFinish {
-                normals: rest.vectors(count)?,
-                albedo: rest.vectors(count)?,
-            })
-        })
-        .collect::<Option<Vec<_>>>()?;
-    (header.format == FORMAT && rest.0.is_empty()).then(|| RadianceTransfer {
+    let (pixels, halves) = bytes[end + 1..].split_at_checked(4 * count)?;
+    let halves = halves.as_chunks().0.iter();
+    let mut values = halves.map(|&half| f16::from_le_bytes(half).to_f32());
+    let mirrors = values.by_ref().take(count).map(|value| value == 1.0);
+    Some(RadianceTransfer {
         size: header.size,
         elevation: header.elevation,
-        pixels,
-        towards_eye,
-        mirrors,
-        blocked: blocked.as_chunks().0.to_vec(),
-        bounced: bounced.as_chunks().0.to_vec(),
-        finishes,
+        pixels: pixels
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&pixel| u32::from_le_bytes(pixel))
+            .collect(),
+        mirrors: mirrors.collect(),
+        blocked: take(&mut values, count),
+        bounced: take(&mut values, count),
+        towards_eye: take(&mut values, count),
+        finishes: (0..header.finishes)
+            .map(|_| TransferFinish {
+                normals: take(&mut values, count),
+                albedo: take(&mut values, count),
+            })
+            .collect(),
     })
 }
 
-/// Bytes that are not decoded yet.
-struct Rest<'a>(&'a [u8]);
-
-impl<'a> Rest<'a> {
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let (taken, rest) = self.0.split_at_checked(count)?;
-        self.0 = rest;
-        Some(taken)
-    }
-
-    fn halves(&mut self, count: usize) -> Option<Vec<f32>> {
-        let bytes = self.take(count.checked_mul(2)?)?;
-        let halves: Vec<f16> = bytes
-            .as_chunks::<2>()
-            .0
-            .iter()
-            .map(|&bytes| f16::from_le_bytes(bytes))
-            .collect();
-        Some(halves.to_f32_vec())
-    }
-
-    fn vectors(&mut self, count: usize) -> Option<Vec<Vec3>> {
-        let values = self.halves(count.checked_mul(3)?)?;
-        Some(
-            values
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .map(|&v| Vec3::from_array(v))
-                .collect(),
-        )
-    }
+/// The next rows of values.
+fn take<const N: usize, T: From<[f32; N]>>(
+    values: &mut impl Iterator<Item = f32>,
+    count: usize,
+) -> Vec<T> {
+    let row = |_| std::array::from_fn(|_| values.next().unwrap_or_default()).into();
+    (0..count).map(row).collect()
 }

@@ -66,22 +66,12 @@ impl Adam {
     /// # Errors
     /// [`TrainError::Torch`].
     pub fn memory(&self) -> Result<Weights, TrainError> {
-        let first = to_weights(&self.first)?;
-        let second = to_weights(&self.second)?;
-        let named = |prefix: &'static str, weights: &Weights| -> Vec<_> {
-            let named = weights
-                .iter()
-                .map(|(name, tensor)| (format!("{prefix}.{name}"), tensor.clone()));
-            named.collect()
-        };
-        let mut all = named("first", &first);
-        all.extend(named("second", &second));
+        let first = to_weights(&self.first)?.prefixed("first.");
+        let second = to_weights(&self.second)?.prefixed("second.");
         let steps = [self.steps / STEPS_PART, self.steps % STEPS_PART].map(|part| part as f32);
-        all.extend(
-            relight_photo::nets::Tensor::new(vec![2], steps.to_vec())
-                .map(|steps| (STEPS.to_owned(), steps)),
-        );
-        Ok(all.into_iter().collect())
+        let steps = relight_photo::nets::Tensor::new(vec![2], steps.to_vec());
+        let steps = steps.map(|steps| (STEPS.to_owned(), steps));
+        Ok(first.into_iter().chain(second).chain(steps).collect())
     }
 
     /// Goes on from a memory that was saved.

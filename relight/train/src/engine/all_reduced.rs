@@ -17,8 +17,6 @@ use crate::error::TrainError;
 pub(crate) struct AllReducedLosses {
     /// By name, with their coefficients; the sum of all is `loss`. Empty where no process has anything to learn from.
     pub(crate) values: BTreeMap<String, f64>,
-    /// How much each head's predictions vary, the mean over the processes.
-    pub(crate) spreads: BTreeMap<&'static str, f64>,
     /// Whether one of several processes was asked to stop.
     pub(crate) stop: bool,
     /// Which part of each loss is this process's.
@@ -26,49 +24,29 @@ pub(crate) struct AllReducedLosses {
 }
 
 impl AllReducedLosses {
-    /// Those of one process.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(crate) fn single_process(losses: &StepLosses) -> Result<Self, TrainError> {
-        let means = losses.terms.means()?;
-        let value = |&(over, value): &(f64, f64)| (over > 0.0).then_some(value);
-        let values: Vec<_> = means.iter().map(value).collect();
-        Ok(Self {
-            values: losses.terms.named(&values),
-            spreads: losses.spreads.clone(),
-            stop: false,
-            parts: vec![1.0; means.len()],
-        })
-    }
-
-    /// Those of all processes of a group.
+    /// Those of all processes of a group, or of one alone.
     ///
     /// # Errors
     /// [`TrainError::Torch`], [`TrainError::ProcessLost`].
     pub(crate) fn new(
         losses: &StepLosses,
         stop: bool,
-        group: &ProcessGroup,
+        group: Option<&ProcessGroup>,
     ) -> Result<Self, TrainError> {
         let means = losses.terms.means()?;
         let mut sums: Vec<f64> = means.iter().map(|(over, _)| *over).collect();
         sums.extend(means.iter().map(|(over, value)| over * value));
-        sums.extend(losses.spreads.values());
         sums.push(f64::from(u8::from(stop)));
-        group.sum(&mut sums)?;
+        if let Some(group) = group {
+            group.sum(&mut sums)?;
+        }
         let (overs, rest) = sums.split_at(means.len());
         let (products, rest) = rest.split_at(means.len());
         let reduced = |(over, product): (&f64, &f64)| (*over > 0.0).then(|| product / over);
         let values: Vec<_> = overs.iter().zip(products).map(reduced).collect();
         let part = |((own, _), all): (&(f64, f64), &f64)| if *all > 0.0 { own / all } else { 0.0 };
-        let processes = f64::from(group.rank().world_size());
-        let spreads = losses.spreads.keys().zip(rest);
         Ok(Self {
             values: losses.terms.named(&values),
-            spreads: spreads
-                .map(|(&head, sum)| (head, sum / processes))
-                .collect(),
             stop: rest.last().is_some_and(|stop| *stop > 0.0),
             parts: means.iter().zip(overs).map(part).collect(),
         })

@@ -46,14 +46,6 @@ impl Model {
         })
     }
 
-    /// The same network with other weights.
-    ///
-    /// # Errors
-    /// Those of [`Model::new`].
-    pub fn with_weights(&self, weights: &Weights) -> Result<Self, TrainError> {
-        Self::new(self.graph.clone(), weights, self.device, self.precision)
-    }
-
     /// What it computes.
     pub fn graph(&self) -> &Graph {
         &self.graph
@@ -89,6 +81,19 @@ impl Model {
             parameter.f_sum(None)?.f_mul_scalar(0.0)?.f_backward()?;
         }
         Ok(())
+    }
+
+    /// Moves its weights by a part of the way to those of the same network.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(crate) fn approach(&mut self, other: &Self, part: f64) -> Result<(), TrainError> {
+        no_grad(|| {
+            for (own, other) in self.parameters.values_mut().zip(other.parameters.values()) {
+                let _ = own.f_lerp_(other, part)?;
+            }
+            Ok(())
+        })
     }
 
     /// Takes over weights.

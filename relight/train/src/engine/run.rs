@@ -222,14 +222,10 @@ impl<'a> Run<'a> {
             self.damaged = true;
             observer.damaged(self.step, damage);
         }
-        let reduced = match &self.group {
-            Some(group) => AllReducedLosses::new(&losses, stop, group)?,
-            None => AllReducedLosses::single_process(&losses)?,
-        };
+        let reduced = AllReducedLosses::new(&losses, stop, self.group.as_ref())?;
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
         if !reduced.values.is_empty() {
-            self.guard
-                .check(self.step, &reduced.values, &reduced.spreads)?;
+            self.guard.check(self.step, &reduced.values)?;
             let norm = self.descend(&losses, &reduced, learning_rate)?;
             self.log(&reduced, (learning_rate, norm), observer)?;
         }
@@ -273,9 +269,6 @@ impl<'a> Run<'a> {
         let mut values = reduced.values.clone();
         values.insert("learning_rate".to_owned(), learning_rate);
         values.insert("gradient_norm".to_owned(), gradient_norm);
-        for (head, spread) in &reduced.spreads {
-            values.insert(format!("spread/{head}"), *spread);
-        }
         metrics_log.scalars(step, &values)
     }
 
@@ -367,7 +360,8 @@ impl<'a> Run<'a> {
         let path = self
             .folder
             .join(format!("{}.safetensors", trainable.name()));
-        trainable.averaged()?.write(&path, WeightPrecision::Half)?;
+        let weights = trainable.average().weights()?;
+        weights.write(&path, WeightPrecision::Half)?;
         Ok(path)
     }
 }

@@ -88,8 +88,6 @@ pub trait TrainingTask {
 pub struct StepLosses {
     /// The losses.
     pub terms: LossTerms,
-    /// How much each head's predictions vary, in parts of the ground truth's variation.
-    pub spreads: BTreeMap<&'static str, f64>,
     /// What was damaged in the data, and is not in the batch.
     pub damage: Option<String>,
 }

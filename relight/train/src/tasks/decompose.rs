@@ -1,7 +1,5 @@
 //! Training of the decomposing network on synthetic samples: its predictions as maps, and its losses.
 
-use std::collections::BTreeMap;
-
 use tch::Tensor;
 
 use super::shadow_vs_paint::ShadowVsPaint;
@@ -196,46 +194,6 @@ fn highlight_energy_error(
     let error = energy(&prediction.highlight.f_sub(&batch.highlight)?)?;
     let value = error.f_div(&over)?;
     Ok(Mean { value, over })
-}
-
-/// How much each head's predictions vary from pixel to pixel under the mask, as a part of the ground truth's variation: a head that has
-/// collapsed answers the same everywhere.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn head_spreads(
-    batch: &TruthBatch,
-    prediction: &PredictedTensors,
-) -> Result<BTreeMap<&'static str, f64>, TrainError> {
-    let pairs = [
-        ("normals", &prediction.normals, &batch.normals),
-        ("albedo", &prediction.albedo, &batch.albedo),
-        ("shading", &prediction.shading, &batch.shading),
-        ("highlight", &prediction.highlight, &batch.highlight),
-    ];
-    pairs
-        .into_iter()
-        .map(|(name, found, truth)| Ok((name, spread(found, truth, &batch.mask)?)))
-        .collect()
-}
-
-/// How much a prediction varies under the mask, as a part of the ground truth's variation; 1 where that has none.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn spread(found: &Tensor, truth: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
-    let (found, truth) = (deviation(found, mask)?, deviation(truth, mask)?);
-    Ok(if truth > 0.0 { found / truth } else { 1.0 })
-}
-
-/// Standard deviation under the mask, all channels together.
-fn deviation(of: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
-    let of = of.f_detach()?;
-    let sum = |of: &Tensor| f64::try_from(of.f_sum(None)?);
-    let count = (sum(mask)? * of.size()[1] as f64).max(1.0);
-    let mean = sum(&of.f_mul(mask)?)? / count;
-    let difference = of.f_sub_scalar(mean)?.f_mul(mask)?;
-    Ok((sum(&difference.f_square()?)? / count).sqrt())
 }
 
 fn grey(of: &Tensor) -> Result<Tensor, tch::TchError> {

@@ -3,7 +3,7 @@
 use tch::Tensor;
 
 use super::contact_sheet::validation_sheet;
-use super::decompose::{PredictedTensors, decompose_losses, head_spreads};
+use super::decompose::{PredictedTensors, decompose_losses};
 use super::validation::{ValidationSamples, highlight_figures};
 use crate::data::photographs::Photographs;
 use crate::data::sample::TruthBatch;
@@ -87,13 +87,12 @@ impl TrainingTask for DecomposeTask {
         let prediction = PredictedTensors::from_outputs(&batch.input, &output)?;
         Ok(StepLosses {
             terms: decompose_losses(&batch, &prediction, &self.settings.loss)?,
-            spreads: head_spreads(&batch, &prediction)?,
             damage: None,
         })
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let (model, device) = (self.trainable.averaged_model()?, self.resources.device);
+        let (model, device) = (self.trainable.average(), self.resources.device);
         let (kind, mut sheet) = (model.precision().kind(), None);
         let figures = self.validation.figures(kind, device, |batch| {
             let prediction =

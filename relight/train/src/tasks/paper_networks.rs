@@ -7,14 +7,14 @@ use tch::{Device, Tensor};
 
 use super::low_rank::chromaticity;
 use super::paper_phases::{
-    TruthLoss, diffuse_chromaticity, diffuse_of_truth, highlight_of, light_on_truth,
-    normal_on_truth, normals_of, reflectance, reflectance_on_turns, saturated_frames,
-    spec_on_truth, spec_on_turns, specular_on_turns,
+    diffuse_chromaticity, diffuse_of_truth, highlight_of, light_on_truth, normal_on_truth,
+    normals_of, reflectance, reflectance_on_turns, saturated_frames, spec_on_truth, spec_on_turns,
+    specular_on_turns,
 };
 use super::validation::{highlight_figures, rank_residual};
 use crate::data::sample::TruthBatch;
 use crate::data::turn_reader::TurnTensors;
-use crate::engine::losses::angular_degrees;
+use crate::engine::losses::{Mean, angular_degrees};
 use crate::engine::model::Model;
 use crate::error::TrainError;
 use crate::settings::{PaperPhase, PaperSettings};
@@ -124,7 +124,7 @@ impl PhaseNetworks {
         &self,
         own: &Model,
         batch: &TruthBatch,
-    ) -> Result<Option<TruthLoss>, TrainError> {
+    ) -> Result<Option<Mean>, TrainError> {
         match self {
             Self::Spec => spec_on_truth(own, batch).map(Some),
             Self::Normal | Self::Joint { .. } => normal_on_truth(own, batch).map(Some),
@@ -152,10 +152,7 @@ impl PhaseNetworks {
                 vec![("normals_deg", f64::try_from(degrees)?)]
             }
             Self::Light { .. } => {
-                vec![(
-                    "shading",
-                    f64::try_from(light_on_truth(own, batch)?.mean.value)?,
-                )]
+                vec![("shading", f64::try_from(light_on_truth(own, batch)?.value)?)]
             }
             Self::Specular { .. } => Vec::new(),
         })

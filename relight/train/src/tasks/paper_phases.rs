@@ -13,7 +13,7 @@
 
 use tch::Tensor;
 
-use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
+use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS};
 use super::low_rank::{chromaticity, low_rank_loss};
 use super::paper_layers::{
     diffuse_shading, network_input, normals_of_slopes, power_highlight, predicted_gloss,
@@ -150,22 +150,11 @@ pub(crate) fn spec_on_turns(
     low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask).map(Some)
 }
 
-/// The loss of a prediction on synthetic samples.
-#[derive(Debug)]
-pub(crate) struct TruthLoss {
-    /// Its loss.
-    pub mean: Mean,
-    /// What is predicted.
-    pub head: &'static str,
-    /// How much it varies, as a part of the ground truth's variation.
-    pub spread: f64,
-}
-
 /// Mean error of Spec-Net's highlight on synthetic samples; highlights count more than their absence.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
     let truth = batch.highlight.f_clamp(0.0, 1.0)?;
     let emphasis = truth
@@ -176,42 +165,29 @@ pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLos
     let error = found.f_sub(&truth)?.f_abs()?.f_mul(&emphasis)?;
     let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
     let value = error.f_sum(None)?.f_div(&over)?.f_mul_scalar(1.0 / 3.0)?;
-    let grey = found.f_mean_dim([1_i64].as_slice(), true, None)?;
-    Ok(TruthLoss {
-        mean: Mean { value, over },
-        head: "highlight",
-        spread: spread(&grey, &truth, &batch.mask)?,
-    })
+    Ok(Mean { value, over })
 }
 
 /// `1 - cos` of Normal-Net's normals on synthetic samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let found = normals_of(normal, &diffuse_of_truth(batch)?, &batch.mask)?;
-    Ok(TruthLoss {
-        mean: angular(&found, &batch.normals, &batch.mask)?,
-        head: "normals",
-        spread: spread(&found, &batch.normals, &batch.mask)?,
-    })
+    angular(&found, &batch.normals, &batch.mask)
 }
 
 /// Scale-invariant error of the shading by Light-Net's light on the true normals of synthetic samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let coefficients = light_of(light, &diffuse_of_truth(batch)?, &batch.mask)?;
     let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
     let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
     let value = scale_invariant(&grey, &batch.shading, &batch.mask)?;
     let over = Tensor::f_from_slice(&[batch.mask.size()[0]])?;
-    Ok(TruthLoss {
-        mean: Mean { value, over },
-        head: "shading",
-        spread: spread(&grey, &batch.shading, &batch.mask)?,
-    })
+    Ok(Mean { value, over })
 }
 
 /// Low-rank loss of the reflectance.
@@ -426,7 +402,7 @@ mod tests {
         };
         let loss = |batch: &TruthBatch| {
             let loss = normal_on_truth(&normal, batch).unwrap();
-            loss.mean.value.double_value(&[])
+            loss.value.double_value(&[])
         };
         let highlight = picture().narrow(1, 0, 1) * 0.3;
         let shining = loss(&batch(picture() * 0.5 + &highlight, highlight.copy()));

@@ -200,8 +200,7 @@ impl TrainingTask for PaperTask {
                 .networks
                 .supervised_loss(&self.trainable.model, &batch)?
             {
-                losses.terms.add_mean("supervised", supervised, loss.mean);
-                losses.spreads.insert(loss.head, loss.spread);
+                losses.terms.add_mean("supervised", supervised, loss);
             }
         }
         self.turn_loss(&mut losses)?;
@@ -209,17 +208,17 @@ impl TrainingTask for PaperTask {
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let own = self.trainable.averaged_model()?;
+        let own = self.trainable.average();
         let device = self.resources.device;
         let mut figures = self
             .validation_samples
             .figures(self.kind(), device, |batch| {
-                self.networks.sample_figures(&own, batch)
+                self.networks.sample_figures(own, batch)
             })?;
         let mut damage = None;
         if let Some(turns) = &mut self.validation_turns {
             damage = turns.take_damage();
-            figures.extend(turns.figures(|turns| self.networks.turn_figures(&own, turns))?);
+            figures.extend(turns.figures(|turns| self.networks.turn_figures(own, turns))?);
         }
         Ok(Validation {
             figures,

@@ -202,7 +202,7 @@ impl TrainingTask for TurnNetworkTask {
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let model = self.trainable.averaged_model()?;
+        let model = self.trainable.average();
         let mut summary = ValidationSummary::default();
         let count = self.settings.data.validation;
         let turns: Vec<(u64, u64)> = (0..count).map(|k| (k, stream(44, k))).collect();

@@ -15,14 +15,11 @@ use super::mtl::{self, MtlMaterial, MtlPicture};
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, RawTriangle};
 use super::sidecar_files::by_name;
-use super::text::{Statements, decoded, keyword, readings, without_comment};
+use super::text::{decoded, keyword, readings, statements, without_comment};
 use crate::texture::{PictureKind, TextureImage};
 
 /// Names that programs give to a missing material.
 const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
-
-/// Most files of materials that one statement may be read as.
-const MAX_LIBRARIES: usize = 32;
 
 /// All parts of the file as one surface, with the materials of the `.mtl` files that it names.
 pub(super) fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
@@ -75,7 +72,7 @@ impl ObjFile {
     fn parsed(text: &str) -> Result<Self, String> {
         let mut file = Self::default();
         let mut material = None;
-        for (line, statement) in Statements::new(text) {
+        for (line, statement) in statements(text) {
             let (key, rest) = keyword(&statement);
             let read = match key {
                 "v" => file.position(rest),
@@ -368,29 +365,19 @@ fn libraries(
     Ok((known, missing))
 }
 
-/// The files that a statement names. Names may hold spaces, and several may stand in one statement: the longest that is there
-/// counts. In place of a file that is not there, its name.
+/// The files that a statement names: one, whose name may hold spaces, or several. In place of a file that is not there, its
+/// name.
 fn split(mesh: &Path, named: &str) -> Vec<Result<PathBuf, String>> {
-    let unquoted = |name: &str| name.trim().trim_matches('"').to_owned();
-    let mut all = Vec::new();
-    let mut rest = named.trim();
-    while !rest.is_empty() && (all.is_empty() || !rest.starts_with('#')) {
-        let spaces = rest.char_indices().filter(|(_, one)| one.is_whitespace());
-        let is_name = |&end: &usize| {
-            rest[..end]
-                .trim_end_matches('"')
-                .to_ascii_lowercase()
-                .ends_with(".mtl")
-        };
-        let ends = spaces.map(|(at, _)| at).filter(is_name);
-        let ends: Vec<usize> = ends.take(MAX_LIBRARIES).chain([rest.len()]).collect();
-        let there = |&end: &usize| Some((end, by_name(mesh, &unquoted(&rest[..end]))?));
-        let (end, library) = match ends.iter().rev().find_map(there) {
-            Some((end, path)) => (end, Ok(path)),
-            None => (ends[0], Err(unquoted(&rest[..ends[0]]))),
-        };
-        all.push(library);
-        rest = rest[end..].trim_start();
+    let found = |name: &str| by_name(mesh, name.trim_matches('"'));
+    if let Some(whole) = readings(named).find_map(found) {
+        return vec![Ok(whole)];
+    }
+    let words = without_comment(named).split_whitespace();
+    let all: Vec<Result<PathBuf, String>> = words
+        .map(|name| found(name).ok_or_else(|| name.to_owned()))
+        .collect();
+    if all.len() > 1 && all.iter().all(Result::is_err) {
+        return vec![Err(named.to_owned())];
     }
     all
 }

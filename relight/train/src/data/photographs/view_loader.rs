@@ -3,15 +3,12 @@
 //! View n is a pure function of the recipe, the library and n, whatever the number of threads: a run that is resumed sees the
 //! views that it would have seen.
 
-use std::collections::BTreeMap;
-use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
-
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use crate::error::TrainError;
 use relight_core::reader::Rank;
@@ -31,15 +28,13 @@ pub(super) struct ViewSource {
     pub(super) library: Library,
 }
 
-/// A view, by its number; `None` if casting it panicked.
-type Cast = (u64, Option<PhotoView>);
-
 /// Threads that cast views.
 #[derive(Debug)]
 pub(super) struct ViewLoader {
-    views: Receiver<Cast>,
-    /// Views that came before their turn.
-    early: BTreeMap<u64, PhotoView>,
+    /// One queue a thread: thread `i` of `n` casts views `i`, `i + n`, `i + 2 n`, ... of this process.
+    queues: Vec<Receiver<PhotoView>>,
+    /// The queue of the next view.
+    turn: usize,
     next: u64,
     /// From one view of this process to the next.
     stride: u64,
@@ -60,42 +55,39 @@ impl ViewLoader {
         threads: usize,
         stop: Arc<AtomicBool>,
     ) -> Result<Self, TrainError> {
-        let threads = threads.max(1);
-        let (sender, views) = bounded(AHEAD * threads);
+        let count = threads.max(1);
         let (index, stride) = (u64::from(rank.index()), u64::from(rank.world_size()));
         let first = first + (index + stride - first % stride) % stride;
-        let next = Arc::new(AtomicU64::new(first));
-        let spawn = |number: usize| {
-            let (source, next) = (Arc::clone(source), Arc::clone(&next));
-            let sender: Sender<Cast> = sender.clone();
-            thread::Builder::new()
-                .name(format!("cast-{number}"))
-                .spawn(move || {
-                    loop {
-                        let number = next.fetch_add(stride, Ordering::Relaxed);
-                        // The one that waits for this view has to learn of a panic: the other threads go on.
-                        let cast = AssertUnwindSafe(|| source.recipe.cast(&source.library, number));
-                        let view = panic::catch_unwind(cast).ok();
-                        // Nobody takes views any more once the loader is dropped.
-                        if sender.send((number, view)).is_err() {
-                            return;
-                        }
-                    }
-                })
-                .map_err(TrainError::io(
-                    Path::new("the threads that cast views"),
-                    "started",
-                ))
-        };
-        let threads = (0..threads).map(spawn).collect::<Result<_, _>>()?;
-        Ok(Self {
-            views,
-            early: BTreeMap::new(),
+        let mut loader = Self {
+            queues: Vec::with_capacity(count),
+            turn: 0,
             next: first,
             stride,
             stop,
-            threads,
-        })
+            threads: Vec::with_capacity(count),
+        };
+        for thread in 0..count {
+            let (sender, views) = sync_channel(AHEAD);
+            let source = Arc::clone(source);
+            let numbers = (first + thread as u64 * stride..).step_by(count * stride as usize);
+            let cast = move || {
+                for number in numbers {
+                    // Nobody takes views any more once the loader is dropped.
+                    let view = source.recipe.cast(&source.library, number);
+                    if sender.send(view).is_err() {
+                        return;
+                    }
+                }
+            };
+            let thread = thread::Builder::new().name(format!("cast-{thread}"));
+            let thread = thread.spawn(cast).map_err(TrainError::io(
+                Path::new("the threads that cast views"),
+                "started",
+            ))?;
+            loader.queues.push(views);
+            loader.threads.push(thread);
+        }
+        Ok(loader)
     }
 
     /// The number of the next view.
@@ -109,18 +101,17 @@ impl ViewLoader {
     /// [`TrainError::Fault`] if casting panicked: a fault of the program. [`TrainError::Stopped`].
     pub(super) fn next_view(&mut self) -> Result<PhotoView, TrainError> {
         loop {
-            if let Some(view) = self.early.remove(&self.next) {
-                self.next += self.stride;
-                return Ok(view);
-            }
             if self.stop.load(Ordering::Relaxed) {
                 return Err(TrainError::Stopped);
             }
-            match self.views.recv_timeout(LOOK) {
-                Ok((number, view)) => {
-                    self.early.insert(number, view.ok_or(NOT_CAST)?);
+            match self.queues[self.turn].recv_timeout(LOOK) {
+                Ok(view) => {
+                    self.turn = (self.turn + 1) % self.queues.len();
+                    self.next += self.stride;
+                    return Ok(view);
                 }
                 Err(RecvTimeoutError::Timeout) => {}
+                // Casting panicked.
                 Err(RecvTimeoutError::Disconnected) => return Err(NOT_CAST),
             }
         }
@@ -130,9 +121,9 @@ impl ViewLoader {
 impl Drop for ViewLoader {
     fn drop(&mut self) {
         // Without a receiver, threads end after the view they are at.
-        self.views = bounded(0).1;
+        self.queues.clear();
         for thread in self.threads.drain(..) {
-            // What panics in one is caught in it.
+            // That one panicked is known by its queue.
             let _ = thread.join();
         }
     }
