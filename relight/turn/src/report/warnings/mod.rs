@@ -32,11 +32,7 @@ impl SolvedTurn {
         warnings.extend(self.solution.verdict().advice().map(str::to_owned));
         let residual = self.solution.residual();
         let is_bad = residual > MAX_RESIDUAL || residual.is_nan();
-        if self.solution.conditioning.contradicts_given_light() {
-            let odd = "the given light hardly changes over the turn, but the object's brightness does: it is not the light of \
-                 this turn";
-            warnings.push(odd.to_owned());
-        } else if self.solution.measured.is_some() && is_bad {
+        if self.solution.measured.is_some() && is_bad {
             warnings.push(format!(
                 "the residual in the given light is {:.0} % of the variation: check that it is this turn's light, in the \
                  viewer's frame at angle 0",
