@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{Linear, Planes, Rgb, Transfer};
+use relight_core::image::{Linear, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::metrics::angular_error;
 use relight_core::render::Surface;

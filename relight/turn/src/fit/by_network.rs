@@ -27,7 +27,8 @@ const CALIBRATION: f64 = 1.14;
 const CALIBRATION_IN_KNOWN: f64 = 1.0;
 
 /// The network's answer for a turn, with the light: a `known` one, in the viewer's frame at the table's angle 0, of which bands
-/// up to 6 count, or the one that fits. The albedo is the mean of its answer and of what the network of photographs has `seen`.
+/// up to 6 count, or the one that fits. The albedo is the mean of its answer and of what the network of photographs has `seen`;
+/// of metal in known light it follows the curves.
 ///
 /// # Errors
 /// If the exposure was wrong, or no light fits the curves.
@@ -58,7 +59,16 @@ pub(crate) fn solve_by_network(
             let model = ShadingModel::in_light(light, frame, material);
             normals = refined(curves, &statistics, &model, &normals, &expected_errors);
             expected_errors = calibrated(CALIBRATION_IN_KNOWN);
-            (model, units(&model, &statistics, &normals, &albedo))
+            let fitted: Vec<[f64; 3]> = (statistics.iter().zip(&normals))
+                .map(|(statistics, &normal)| statistics.albedo(&model.harmonics(normal)))
+                .collect();
+            if material == MaterialKind::Metal {
+                // The networks know little of metal.
+                albedo = fitted;
+                (model, [1.0; 3])
+            } else {
+                (model, units(&fitted, &albedo))
+            }
         }
         None => {
             let all: Vec<&CurveStatistics> = statistics.iter().collect();
@@ -87,15 +97,7 @@ pub(crate) fn solve_by_network(
 }
 
 /// By what each channel of an albedo is multiplied to be in the light's units: the median of what the curves say.
-fn units(
-    model: &ShadingModel,
-    statistics: &[CurveStatistics],
-    normals: &[[f64; 3]],
-    albedo: &[[f64; 3]],
-) -> [f64; 3] {
-    let fitted: Vec<[f64; 3]> = (statistics.iter().zip(normals))
-        .map(|(statistics, &normal)| statistics.albedo(&model.harmonics(normal)))
-        .collect();
+fn units(fitted: &[[f64; 3]], albedo: &[[f64; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|c| {
         let ratios = fitted.iter().zip(albedo);
         let ratios = ratios.map(|(fitted, albedo)| fitted[c] / albedo[c].max(1e-12));

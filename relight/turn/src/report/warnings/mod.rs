@@ -6,8 +6,9 @@ use crate::fit::probe_light::ProbeLight;
 use crate::model::frame::FactSource;
 use crate::solving::SolvedTurn;
 
-/// Residual of a given light, over the energy of the variation, from which it is not that of the turn. By hand.
-const MAX_RESIDUAL: f64 = 0.4;
+/// Residual of a given light, over the energy of the variation, from which it is not that of the turn. Measured: on nine synthetic
+/// turns 0.02 to 0.80 in their light, and 0.89 to 1.86 in the same light turned by 90 or 180 degrees.
+const MAX_RESIDUAL: f64 = 0.85;
 
 impl SolvedTurn {
     /// Its warnings.

@@ -1,7 +1,10 @@
+use std::f64::consts::PI;
+
+use relight_core::light::{Direction, Rotation};
 use relit_data::rig::RotationDirection;
 
-use crate::tests::{SOLVED, ball, environment, even_environment, expecting, read, solve, solved};
-use crate::{FactSource, ReadTurn, SolvedTurn, TableRotation};
+use crate::tests::{SOLVED, ball, elevation, environment, expecting, read, solve, solved};
+use crate::{FactSource, ReadTurn, SolvedTurn, TableFrame, TableRotation};
 
 /// The ball's turn in its own light.
 fn ball_solved() -> SolvedTurn {
@@ -33,8 +36,10 @@ fn the_light_of_another_turn_damage_and_missing_angles_are_told_in_order() {
         damage: vec!["sample 3 is damaged".to_owned()],
         ..good.turn
     };
+    let [x, y, z] = TableFrame::new(elevation()).axis();
+    let half = Rotation::about(Direction::new(x, y, z).unwrap(), PI);
     let solved = SolvedTurn {
-        solution: solve(&turn.curves, &even_environment()),
+        solution: solve(&turn.curves, &environment().rotated(&half)),
         turn,
         ..good
     };
