@@ -4,11 +4,11 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Linear, Rgb, Transfer};
-use relight_core::light::{Direction, Normals, Rotation, ShLight, YUp};
+use relight_core::light::{Normals, ShLight, YUp};
 use relight_synth::SequenceDescription;
 use relight_turn::{
-    Elevation, MaterialKind, SolvedTurn, TableFrame, TurnError, TurnLight, TurnNetworks,
-    TurnOptions, TurnVerdict, solve_turn,
+    Elevation, MaterialKind, SolvedTurn, TurnError, TurnLight, TurnNetworks, TurnOptions,
+    TurnVerdict, solve_turn,
 };
 use relit_data::rig::RotationDirection;
 use relit_data::shard::Dataset;
@@ -20,8 +20,6 @@ use super::{EvalError, EvalProgress};
 
 /// Expected errors for which the pixels within them are counted, degrees.
 const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
-/// Azimuths that are tried for the turn about the table's axis, degrees to each side.
-const AZIMUTHS_DEG: i32 = 90;
 
 /// The methods for turns, as named in the table, and whether they get the true light.
 const METHODS: [(&str, bool); 2] = [("light unknown", false), ("light known", true)];
@@ -33,10 +31,6 @@ struct TurnScore {
     /// Mean and median angle between found and true normals, degrees.
     mean_deg: f64,
     median_deg: f64,
-    /// By how much the answer is turned about the table's axis, degrees: without that its mean error is least.
-    azimuth_deg: f64,
-    /// That least mean error, degrees.
-    unturned_deg: f64,
     /// Squared error of the albedo over its energy, after one scale a channel.
     albedo: f64,
     /// For the pixels that are expected to be off by at most 10, 20 and 30 degrees: how many there are, and how many
@@ -184,7 +178,6 @@ fn score(name: &str, truth: &TrueTurn, solved: &SolvedTurn) -> TurnScore {
         .zip(&found)
         .map(|(a, b)| angle_deg(*a, *b))
         .collect();
-    let (azimuth_deg, unturned_deg) = best_azimuth(&right, &found, truth.elevation);
     let expected = solution.expected_errors(curves);
     let expected: Vec<f64> = (inside.iter())
         .map(|&at| f64::from(expected.plane(0)[at]))
@@ -200,8 +193,6 @@ fn score(name: &str, truth: &TrueTurn, solved: &SolvedTurn) -> TurnScore {
         turn: name.to_owned(),
         mean_deg: mean(&errors),
         median_deg: median(errors.iter().copied()).unwrap_or(0.0),
-        azimuth_deg,
-        unturned_deg,
         albedo: albedo_error(&truth.albedo, &solution.albedo(curves), &inside),
         kept,
         expected_mean_deg: mean(&expected),
@@ -218,27 +209,6 @@ fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let cosine = dot(a, b) / (dot(a, a) * dot(b, b)).sqrt().max(1e-12);
     cosine.clamp(-1.0, 1.0).acos().to_degrees()
-}
-
-/// The turn about the table's axis by which the answer is off, degrees, and the mean error without it.
-fn best_azimuth(right: &[[f64; 3]], found: &[[f64; 3]], elevation: Elevation) -> (f64, f64) {
-    let [x, y, z] = TableFrame::new(elevation).axis();
-    let axis = Direction::new(x, y, z).unwrap_or(Direction::UP);
-    let every = (right.len() / 2000).max(1);
-    let tried = (-AZIMUTHS_DEG..=AZIMUTHS_DEG).map(|degrees| {
-        let degrees = f64::from(degrees);
-        let back = Rotation::about(axis, -degrees.to_radians());
-        let turned = |[x, y, z]: [f64; 3]| {
-            back.matrix()
-                .map(|row| row[0] * x + row[1] * y + row[2] * z)
-        };
-        let pairs = right.iter().zip(found).step_by(every);
-        let errors: Vec<f64> = pairs.map(|(a, b)| angle_deg(*a, turned(*b))).collect();
-        (degrees, mean(&errors))
-    });
-    tried
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or((0.0, 0.0))
 }
 
 /// The squared error over the energy, each channel of the answer scaled to fit best.
@@ -293,34 +263,22 @@ impl fmt::Display for TurnScores {
         writeln!(f, "turns, {turns} of {}", self.split)?;
         writeln!(
             f,
-            "  errors of normals in degrees, averaged over the turns ± standard error: mean, median; azimuth: mean rotation \
-             of the answers about the table's axis; unturned: mean error without it; expected: the predicted error; albedo: \
-             squared error over energy; 10, 20, 30: how many pixels expected within so many degrees are"
+            "  errors of normals in degrees, averaged over the turns ± standard error: mean, median; expected: the \
+             predicted error; albedo: squared error over energy; 10, 20, 30: how many pixels expected within so many degrees are"
         )?;
         writeln!(
             f,
-            "{:24}  {:>12}  {:>12}  {:>7}  {:>8}  {:>8}  {:>6}  {:>5} {:>5} {:>5}",
-            "method",
-            "mean",
-            "median",
-            "azimuth",
-            "unturned",
-            "expected",
-            "albedo",
-            "10",
-            "20",
-            "30"
+            "{:24}  {:>12}  {:>12}  {:>8}  {:>6}  {:>5} {:>5} {:>5}",
+            "method", "mean", "median", "expected", "albedo", "10", "20", "30"
         )?;
         for line in &self.lines {
             let (mean, error) = line.mean_of(|turn| turn.mean_deg);
             let (median, median_error) = line.mean_of(|turn| turn.median_deg);
-            let (azimuth, _) = line.mean_of(|turn| turn.azimuth_deg.abs());
-            let (unturned, _) = line.mean_of(|turn| turn.unturned_deg);
             let (expected, _) = line.mean_of(|turn| turn.expected_mean_deg);
             let (albedo, _) = line.mean_of(|turn| turn.albedo);
             write!(
                 f,
-                "{:24}  {:>12}  {:>12}  {azimuth:>7.1}  {unturned:>8.1}  {expected:>8.1}  {albedo:>6.3} ",
+                "{:24}  {:>12}  {:>12}  {expected:>8.1}  {albedo:>6.3} ",
                 line.method,
                 format!("{mean:.1} ± {error:.1}"),
                 format!("{median:.1} ± {median_error:.1}"),
@@ -333,40 +291,5 @@ impl fmt::Display for TurnScores {
             writeln!(f)?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_answer_turned_about_the_axis_is_found_out() {
-        let elevation = Elevation::measured(20.0).unwrap();
-        let [x, y, z] = TableFrame::new(elevation).axis();
-        let axis = Direction::new(x, y, z).unwrap();
-        let turn = Rotation::about(axis, 17.0_f64.to_radians());
-        let right: Vec<[f64; 3]> = (0..200)
-            .map(|k| {
-                let (u, v) = (
-                    f64::from(k % 20) / 12.0 - 0.8,
-                    f64::from(k / 20) / 8.0 - 0.6,
-                );
-                let length = (u * u + v * v + 1.0).sqrt();
-                [u / length, v / length, 1.0 / length]
-            })
-            .collect();
-        let found: Vec<[f64; 3]> = right
-            .iter()
-            .map(|&[x, y, z]| {
-                turn.matrix()
-                    .map(|row| row[0] * x + row[1] * y + row[2] * z)
-            })
-            .collect();
-        let (azimuth, rest) = best_azimuth(&right, &found, elevation);
-        assert!(
-            (azimuth - 17.0).abs() < 0.5 && rest < 0.01,
-            "{azimuth} {rest}"
-        );
     }
 }

@@ -35,7 +35,7 @@ def test_a_solved_turn_is_the_program_s(tmp_path, given):
     for name, layer in (("albedo", found.albedo), ("shading", found.shading)):
         layer = relit.to_srgb(layer / numpy.float32(figures["white"][name]), numpy.uint16)
         assert abs(layer - 65535 * relit.read_image(tmp_path / f"out/{name}.png", transfer="linear")).max() < 0.1
-    assert (found.specular is None) == (figures["gloss"] is None)
+    assert (found.specular is None) == (figures["material"] == "diffuse")
     assert found.expected_error.shape == found.confidence.shape == found.mask.shape
 
 

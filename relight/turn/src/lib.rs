@@ -1,17 +1,16 @@
 //! A whole turn into normals, albedo and the environment light.
 //!
 //! Camera and object ride on one table, so for the object the environment light rotates about the table's axis by an
-//! angle that is known. [`read_curves`] reduces a turn to one curve over that angle for each pixel and channel. In unknown
-//! light the network of turns estimates normals and albedo, and one linear fit finds the light. In measured light
-//! photometric stereo solves for normals and albedo; the network of turns then only checks the rotation direction.
-//! [`solve_turn`] does either, from a shard, and [`TurnFiles`] writes the results.
+//! angle that is known. [`read_curves`] reduces a turn to one curve over that angle for each pixel and channel. The network of
+//! turns estimates normals and albedo. A measured light moves the normals to where the curves fit better; else one linear fit
+//! finds the light. [`solve_turn`] does either, from a shard, and [`TurnFiles`] writes the results.
 //!
 //! | module | concern |
 //! | --- | --- |
-//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (light along a direction), `shading` (diffuse, glossy, metal) |
+//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (light along a direction), `shading` (diffuse, metal) |
 //! | `observe` | what the frames show: `reading`, `curves`, `conditioning`; `film` and `probe` for a ball in the video |
 //! | `network` | `input`, `predict`: normals and albedo by the network of turns |
-//! | `fit` | `known_light`: the gloss of all pixels, `search` (one pixel), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
+//! | `fit` | `by_network`: normals (`known_light`), light (`environment`) and albedo (`photo_albedo`) of a turn; `probe_light`, `probe_check`: the light by a ball |
 //! | `report` | `files`, `sheet`, `movie`, `object`: what is written; `warnings`: what a user should know |
 //!
 //! `solving` puts them together. A folder knows those above it in this table. Each module has its parameters as constants, with
@@ -32,7 +31,6 @@ mod tests;
 pub use error::TurnError;
 pub use fit::environment::fit_turn_light;
 pub use fit::given_light::read_given_light;
-pub use fit::known_light::solve_in_light;
 pub use fit::probe_light::ProbeLight;
 pub use fit::solution::TurnSolution;
 pub use model::frame::{Elevation, FactSource, TableFrame};

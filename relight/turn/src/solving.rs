@@ -9,11 +9,10 @@ use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::Recording;
 
 use crate::error::TurnError;
-use crate::fit::known_light::solve_in_light;
+use crate::fit::by_network::solve_by_network;
 use crate::fit::photo_albedo::photo_albedo;
 use crate::fit::probe_light::ProbeLight;
 use crate::fit::solution::TurnSolution;
-use crate::fit::unknown_light::solve_by_network;
 use crate::model::frame::{Elevation, FactSource};
 use crate::model::material::MaterialKind;
 use crate::network::predict::{NetworkFigures, TurnNetwork, TurnPrediction};
@@ -124,19 +123,9 @@ pub fn solve_turn(
         TurnLight::Given(light) => Some(light),
         TurnLight::Ball { .. } | TurnLight::Unknown => ball.as_ref().map(|ball| &ball.light),
     };
-    let solution = match given {
-        Some(light) => solve_in_light(&turn.curves, light, elevation, options.material),
-        None => {
-            let seen = photo_albedo(&networks.photo, &turn.first, &turn.mask)?;
-            solve_by_network(
-                &turn.curves,
-                &prediction,
-                &seen,
-                elevation,
-                options.material,
-            )?
-        }
-    };
+    let seen = photo_albedo(&networks.photo, &turn.first, &turn.mask)?;
+    let facts = (elevation, options.material);
+    let solution = solve_by_network(&turn.curves, &prediction, &seen, given, facts)?;
     Ok(SolvedTurn {
         turn,
         solution,

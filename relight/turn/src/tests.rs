@@ -8,15 +8,15 @@ use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
 use relight_core::metrics::angular_error;
 use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 
+use crate::fit::by_network::solve_by_network;
 use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
-use crate::model::lighting::{MIRROR, TableLight};
 use crate::model::shading::ShadingModel;
 use crate::network::predict::NetworkFigures;
 use crate::network::predict::TurnPrediction;
 use crate::observe::curves::CurveBuilder;
 use crate::{
     Elevation, FactSource, MaterialKind, ReadTurn, SolvedTurn, TableFrame, TableRotation,
-    TurnCurves, TurnSolution, solve_in_light,
+    TurnCurves, TurnSolution,
 };
 
 pub(crate) const SIDE: usize = 24;
@@ -98,9 +98,26 @@ pub(crate) fn film(surface: &Surface, light: &ShLight, take: Take) -> TurnCurves
     builder.finish().unwrap()
 }
 
-/// What is found of curves in a light that is known.
+/// By how much the normals of [`leaning`] are off, degrees.
+pub(crate) const LEAN_DEG: f64 = 12.0;
+
+/// A network of turns that knows the ball, but that all its normals lean to the right.
+pub(crate) fn leaning() -> TurnPrediction {
+    let mut prediction = knowing(&ball(), LEAN_DEG as f32);
+    let (sin, cos) = (LEAN_DEG as f32).to_radians().sin_cos();
+    let right = prediction.normals.planes();
+    let normals = Planes::from_fn(right.extent(), |x, y| {
+        let [x, y, z] = right.pixel(x, y);
+        [cos * x + sin * z, y, cos * z - sin * x]
+    });
+    prediction.normals = Normals::new(normals);
+    prediction
+}
+
+/// What is found of the ball's curves in a light that is known, by such a network.
 pub(crate) fn solve(curves: &TurnCurves, light: &ShLight) -> TurnSolution {
-    solve_in_light(curves, light, elevation(), MaterialKind::Diffuse)
+    let facts = (elevation(), MaterialKind::Diffuse);
+    solve_by_network(curves, &leaning(), ball().albedo(), Some(light), facts).unwrap()
 }
 
 /// The median of the angle between normals, degrees: at the rim a few pixels have two answers.
@@ -166,9 +183,12 @@ pub(crate) fn film_in(environment: &ShadingModel, surface: &Surface) -> TurnCurv
         let basis = basis_at(angle.to_radians());
         let image = Planes::from_fn(extent, |x, y| {
             let normal = surface.normals().planes().pixel(x, y).map(f64::from);
-            let [base, gloss] = lit(environment, normal, &basis);
             let albedo = surface.albedo().planes().pixel(x, y).map(f64::from);
-            [0, 1, 2].map(|c| (albedo[c] * base[c] + gloss[c]) as f32)
+            let shown = environment.harmonics(normal);
+            [0, 1, 2].map(|c| {
+                let pairs = shown[c].iter().zip(&basis);
+                (albedo[c] * pairs.map(|(a, b)| a * b).sum::<f64>()) as f32
+            })
         });
         builder.push(angle, extent, image.planes()).unwrap();
     }
@@ -188,14 +208,11 @@ pub(crate) fn windows() -> ShLight {
 /// A ball of metal in an environment, whose lobe attenuates each band.
 pub(crate) fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let (surface, light) = (ball(), windows());
-    let table = TableFrame::new(elevation());
-    let shown = TableLight::from_light(&light.rotated(&table.rotation()));
-    let metal = ShadingModel {
-        frame: table,
-        diffuse: TableLight::NONE,
-        gloss: shown.scaled(|l, _| MIRROR * [1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5][l]),
-        material: MaterialKind::Metal,
-    };
+    let mut metal =
+        ShadingModel::in_light(&light, TableFrame::new(elevation()), MaterialKind::Metal);
+    metal.shown = metal
+        .shown
+        .scaled(|l, _| [1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5][l]);
     let curves = film_in(&metal, &surface);
     (surface, light, curves)
 }
@@ -251,15 +268,4 @@ pub(crate) fn basis_at(angle: f64) -> [f64; COEFFICIENTS] {
         basis[2 * harmonic] = -sin;
     }
     basis
-}
-
-/// What a pixel shows at an angle: its base layer at an albedo of 1, which of a Lambertian one is its irradiance, and
-/// its gloss.
-fn lit(model: &ShadingModel, normal: [f64; 3], basis: &[f64; COEFFICIENTS]) -> [[f64; 3]; 2] {
-    let harmonics = model.harmonics(normal);
-    let dot = |harmonics: &[f64]| -> f64 { harmonics.iter().zip(basis).map(|(a, b)| a * b).sum() };
-    [
-        harmonics.base.each_ref().map(|harmonics| dot(harmonics)),
-        harmonics.gloss.each_ref().map(|harmonics| dot(harmonics)),
-    ]
 }

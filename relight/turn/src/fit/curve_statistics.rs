@@ -27,40 +27,10 @@ pub(crate) struct CurveStatistics {
     unit: f64,
 }
 
-/// Products of [`PixelWaves`] with themselves and each other, as [`Moments`] take them.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct HarmonicProducts {
-    base: [[f64; PAIRS]; 3],
-    /// Of both, and of the gloss with itself; none without gloss.
-    gloss: Option<[[[f64; PAIRS]; 2]; 3]>,
-}
-
 /// The place of the product of harmonics `i` and `j`.
 const fn pair(i: usize, j: usize) -> usize {
     let (low, high) = if i < j { (i, j) } else { (j, i) };
     high * (high + 1) / 2 + low
-}
-
-impl HarmonicProducts {
-    pub(crate) fn from_harmonics(harmonics: &PixelHarmonics) -> Self {
-        let mut products = Self {
-            base: [[0.0; PAIRS]; 3],
-            gloss: None,
-        };
-        for (products, own) in products.base.iter_mut().zip(&harmonics.base) {
-            symmetric(products, own, own);
-        }
-        if harmonics.gloss != [[0.0; COEFFICIENTS]; 3] {
-            products.gloss = Some([0, 1, 2].map(|channel| {
-                let gloss = &harmonics.gloss[channel];
-                let mut both = [[0.0; PAIRS]; 2];
-                symmetric(&mut both[0], &harmonics.base[channel], gloss);
-                symmetric(&mut both[1], gloss, gloss);
-                both
-            }));
-        }
-        products
-    }
 }
 
 /// The factors of each pair in the product of two lists of harmonics.
@@ -76,43 +46,20 @@ fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
     }
 }
 
-/// The projection of a channel's curve on a pixel's harmonics: products of the base layer's harmonics with the residual
-/// of the gloss, of the base layer's harmonics with themselves, and the energy of that residual.
-#[derive(Debug, Clone, Copy)]
-struct Projection {
-    along: f64,
-    own: f64,
-    rest: f64,
-}
-
-impl Projection {
-    /// The albedo, shrunk toward another one with this weight relative to the curve.
-    fn shrunk(self, to: f64, by: f64) -> f64 {
-        if self.own + by > 1e-12 {
-            ((self.along + by * to) / (self.own + by)).max(0.0)
-        } else {
-            0.0
-        }
-    }
-
-    fn albedo(self) -> f64 {
-        if self.own > 1e-12 {
-            (self.along / self.own).max(0.0)
-        } else {
-            0.0
-        }
-    }
-
-    /// The residual of the best albedo.
-    fn residual(self) -> f64 {
-        let albedo = self.albedo();
-        self.rest - albedo * (2.0 * self.along - albedo * self.own)
-    }
+/// A linear problem for a small rotation of a pixel's normal: sums over all channels, over the energy of the curve's variation.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RotationEquations {
+    /// Products of the changes by a rotation about each axis: the lower triangle, row by row.
+    pub(crate) products: [f64; 6],
+    /// Products of the changes with the residual.
+    pub(crate) right: [f64; 3],
+    /// The residual with the albedo that fits the curve best.
+    pub(crate) residual: f64,
 }
 
 impl CurveStatistics {
-    /// Those of a pixel; `robust` has the robust weight of each part of the turn, 0 to 1.
-    pub(crate) fn new(curves: &TurnCurves, pixel: usize, robust: Option<&[f32]>) -> Self {
+    /// Those of a pixel.
+    pub(crate) fn new(curves: &TurnCurves, pixel: usize) -> Self {
         let mut statistics = Self {
             right: [[0.0; COEFFICIENTS]; 3],
             products: [[0.0; PAIRS]; 3],
@@ -121,10 +68,9 @@ impl CurveStatistics {
         };
         let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
         for (part, (value, weight)) in parts.enumerate() {
-            let robust = robust.map_or(1.0, |robust| f64::from(robust[part]));
             let harmonics = &curves.harmonics()[part];
             for channel in 0..3 {
-                let weight = f64::from(weight[channel]) * robust;
+                let weight = f64::from(weight[channel]);
                 if weight > 0.0 {
                     statistics.add(channel, weight, f64::from(value[channel]), harmonics);
                 }
@@ -178,60 +124,78 @@ impl CurveStatistics {
         self
     }
 
-    /// Whether there is nothing to fit.
-    pub(crate) fn is_dark(&self) -> bool {
-        self.unit == 0.0
-    }
-
-    fn share(
-        &self,
-        channel: usize,
-        harmonics: &PixelHarmonics,
-        products: &HarmonicProducts,
-    ) -> Projection {
-        let own = &self.products[channel];
-        let mut share = Projection {
-            along: sum_of_products(&self.right[channel], &harmonics.base[channel]),
-            own: sum_of_products(own, &products.base[channel]),
-            rest: self.energy[channel],
-        };
-        if let Some(gloss) = &products.gloss {
-            let [both, gloss] = &gloss[channel];
-            share.along -= sum_of_products(own, both);
-            share.rest += sum_of_products(own, gloss)
-                - 2.0 * sum_of_products(&self.right[channel], &harmonics.gloss[channel]);
-        }
-        share
-    }
-
     /// The residual of the best albedo, over the energy of the curve's variation.
-    pub(crate) fn residual(&self, harmonics: &PixelHarmonics, products: &HarmonicProducts) -> f64 {
+    pub(crate) fn residual(&self, harmonics: &PixelHarmonics) -> f64 {
+        let albedo = self.albedo(harmonics);
         let rest: f64 = (0..3)
-            .map(|channel| self.share(channel, harmonics, products).residual())
+            .map(|channel| {
+                let shown = harmonics[channel].map(|value| albedo[channel] * value);
+                self.residual_energy(channel, &shown)
+            })
             .sum();
         (rest * self.unit).max(0.0)
     }
 
     /// The albedo that fits the curve best.
     pub(crate) fn albedo(&self, harmonics: &PixelHarmonics) -> [f64; 3] {
-        let products = HarmonicProducts::from_harmonics(harmonics);
-        [0, 1, 2].map(|channel| self.share(channel, harmonics, &products).albedo())
+        [0, 1, 2].map(|channel| {
+            let harmonics = &harmonics[channel];
+            let own = sum_of_products(harmonics, &self.times(channel, harmonics));
+            if own > 1e-12 {
+                (sum_of_products(harmonics, &self.right[channel]) / own).max(0.0)
+            } else {
+                0.0
+            }
+        })
     }
 
-    /// The albedo that fits the curve best, shrunk toward one from which albedos of an object are `spread` away: as far
-    /// as the curve's residual, as noise of `freedom` degrees of freedom, leaves it uncertain.
-    pub(crate) fn shrunk_albedo(
+    /// How the curve changes by a small rotation of the normal, from what it shows and from what it shows after `step` radians about
+    /// each axis. The albedo follows the normal.
+    pub(crate) fn rotation_equations(
         &self,
-        harmonics: &PixelHarmonics,
-        (to, spread): ([f64; 3], [f64; 3]),
-        freedom: f64,
-    ) -> [f64; 3] {
-        let products = HarmonicProducts::from_harmonics(harmonics);
-        [0, 1, 2].map(|channel| {
-            let share = self.share(channel, harmonics, &products);
-            let noise = share.residual().max(0.0) / freedom;
-            let by = noise / spread[channel].powi(2).max(1e-12);
-            share.shrunk(to[channel], by)
+        shown: &PixelHarmonics,
+        turned: &[PixelHarmonics; 3],
+        step: f64,
+    ) -> RotationEquations {
+        let mut equations = RotationEquations {
+            residual: self.residual(shown),
+            ..RotationEquations::default()
+        };
+        for (channel, albedo) in self.albedo(shown).into_iter().enumerate() {
+            let base = &shown[channel];
+            let weighted = self.times(channel, base);
+            let own = sum_of_products(base, &weighted);
+            if own <= 1e-12 {
+                continue;
+            }
+            let rest: [f64; COEFFICIENTS] =
+                std::array::from_fn(|i| self.right[channel][i] - albedo * weighted[i]);
+            let changes = turned.each_ref().map(|turned| -> [f64; COEFFICIENTS] {
+                let change: [f64; COEFFICIENTS] =
+                    std::array::from_fn(|i| albedo * (turned[channel][i] - base[i]) / step);
+                let along = sum_of_products(&change, &weighted) / own;
+                std::array::from_fn(|i| change[i] - along * base[i])
+            });
+            let mut at = 0;
+            for (i, change) in changes.iter().enumerate() {
+                let weighted = self.times(channel, change);
+                equations.right[i] += self.unit * sum_of_products(change, &rest);
+                for other in &changes[..=i] {
+                    equations.products[at] += self.unit * sum_of_products(other, &weighted);
+                    at += 1;
+                }
+            }
+        }
+        equations
+    }
+
+    /// The products of harmonics with each other, times these.
+    fn times(&self, channel: usize, harmonics: &[f64; COEFFICIENTS]) -> [f64; COEFFICIENTS] {
+        let own = &self.products[channel];
+        std::array::from_fn(|i| {
+            (0..COEFFICIENTS)
+                .map(|j| own[pair(i, j)] * harmonics[j])
+                .sum()
         })
     }
 
@@ -261,24 +225,6 @@ impl CurveStatistics {
         let right = &self.right[channel][term.coefficient..];
         term.parts[0] * right[0] + term.parts[1] * right[1]
     }
-
-    /// The mean light of a curve, channel by channel.
-    pub(crate) fn mean(curves: &TurnCurves, pixel: usize) -> [f64; 3] {
-        let (mut sum, mut weights) = ([0.0; 3], [0.0; 3]);
-        for (value, weight) in curves.values(pixel).iter().zip(curves.weights(pixel)) {
-            for channel in 0..3 {
-                sum[channel] += f64::from(value[channel] * weight[channel]);
-                weights[channel] += f64::from(weight[channel]);
-            }
-        }
-        [0, 1, 2].map(|c| {
-            if weights[c] > 0.0 {
-                sum[c] / weights[c]
-            } else {
-                0.0
-            }
-        })
-    }
 }
 
 /// The sum of products, as far as the shorter list goes: in four sums, which do not wait for each other.
@@ -298,6 +244,6 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
 pub(crate) fn all_statistics(curves: &TurnCurves) -> Vec<CurveStatistics> {
     (0..curves.pixels())
         .into_par_iter()
-        .map(|pixel| CurveStatistics::new(curves, pixel, None))
+        .map(|pixel| CurveStatistics::new(curves, pixel))
         .collect()
 }

@@ -1,7 +1,6 @@
 //! Normals, albedo and light that fit the curves.
 
-pub(crate) mod albedo;
-pub(crate) mod confidence;
+pub(crate) mod by_network;
 pub(crate) mod curve_statistics;
 pub(crate) mod environment;
 pub(crate) mod given_light;
@@ -9,7 +8,5 @@ pub(crate) mod known_light;
 pub(crate) mod photo_albedo;
 pub(crate) mod probe_check;
 pub(crate) mod probe_light;
-pub(crate) mod residuals;
-pub(crate) mod search;
+pub(crate) mod smoothing;
 pub(crate) mod solution;
-pub(crate) mod unknown_light;

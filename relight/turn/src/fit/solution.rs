@@ -2,11 +2,8 @@
 
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
-use relight_core::render::mirror_reflectance;
 use relit_data::statistics::median;
-use serde::Serialize;
 
-use crate::fit::search::PixelFit;
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
@@ -20,9 +17,9 @@ const HALF_ERROR: f64 = 0.2;
 /// Normals, albedo and light.
 #[derive(Debug, Clone)]
 pub struct TurnSolution {
-    /// One a pixel under the mask.
-    pub(crate) fits: Vec<PixelFit>,
-    /// The albedo of each pixel: in known light that of its fit where its normal is to be trusted.
+    /// One a pixel under the mask, in the viewer's frame.
+    pub(crate) normals: Vec<[f64; 3]>,
+    /// The albedo of each pixel.
     pub(crate) albedo: Vec<[f64; 3]>,
     /// The angle that each normal is expected to be off, radians.
     pub(crate) expected_errors: Vec<f64>,
@@ -31,37 +28,18 @@ pub struct TurnSolution {
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
     pub(crate) conditioning: Conditioning,
-    /// `None` if the object has none.
-    pub(crate) gloss: Option<EstimatedGloss>,
-}
-
-/// Specular reflectance and smoothness of the whole object, as the render layers take them; of metal of an albedo of 1.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct EstimatedGloss {
-    pub(crate) reflectance: f32,
-    pub(crate) smoothness: f32,
-}
-
-impl EstimatedGloss {
-    /// Of a surface that faces the viewer and reflects this part of even light.
-    pub(crate) fn new(part: f64, smoothness: f64) -> Self {
-        let smoothness = smoothness as f32;
-        Self {
-            reflectance: mirror_reflectance(part as f32, smoothness),
-            smoothness,
-        }
-    }
+    /// The median over the pixels of the residual of a curve, over the energy of its variation.
+    pub(crate) residual: f64,
 }
 
 impl TurnSolution {
     /// The normals in the viewer's frame.
     pub fn normals(&self, curves: &TurnCurves) -> Normals<YUp> {
-        Normals::new(curves.map(|pixel| self.fits[pixel].normal.map(|v| v as f32)))
+        Normals::new(curves.map(|pixel| self.normals[pixel].map(|v| v as f32)))
     }
 
     /// The albedo: in the light's units where that was known, else in such units that the mean shading of the object
-    /// over the turn is 1 in each channel. In known light it is that of the same colour around where a normal is hardly to be
-    /// trusted; in unknown light, what networks answer.
+    /// over the turn is 1 in each channel.
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))
     }
@@ -69,8 +47,8 @@ impl TurnSolution {
     /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
     pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
-            let harmonics = self.model.harmonics(self.fits[pixel].normal);
-            harmonics.base.map(|harmonics| harmonics[0].max(0.0) as f32)
+            let harmonics = self.model.harmonics(self.normals[pixel]);
+            harmonics.map(|harmonics| harmonics[0].max(0.0) as f32)
         }))
     }
 
@@ -107,8 +85,8 @@ impl TurnSolution {
     }
 
     /// The median over the pixels of the residual of a curve, over the energy of its variation.
-    pub fn residual(&self) -> f64 {
-        median(self.fits.iter().map(|fit| fit.residual)).unwrap_or(0.0)
+    pub const fn residual(&self) -> f64 {
+        self.residual
     }
 
     /// The median over the pixels of the angle that a normal is expected to be off, degrees.

@@ -16,10 +16,6 @@ pub(crate) const LAMBERTIAN_TERMS: usize = LAMBERTIAN_BANDS * LAMBERTIAN_BANDS;
 
 const LAMBERTIAN_BANDS: usize = 3;
 
-/// Reflectance of a dielectric at normal incidence, 0 to 1; at a glancing angle it is 1. By convention, for an index of
-/// refraction of 1.5.
-pub(crate) const HEAD_ON: f64 = 0.04;
-
 /// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a
 /// Lambertian white surface in even light, π times it, and the terms are √(4π) times the harmonics.
 pub(crate) const MIRROR: f64 = 0.886_226_925_452_758;
@@ -38,11 +34,6 @@ pub(crate) struct TableLight {
 }
 
 impl TableLight {
-    /// Darkness.
-    pub(crate) const NONE: Self = Self {
-        terms: [[0.0; TERMS]; 3],
-    };
-
     /// The light of these terms.
     pub(crate) const fn new(terms: [[f64; TERMS]; 3]) -> Self {
         Self { terms }
@@ -99,11 +90,6 @@ impl TableLight {
         })
     }
 
-    /// Whether it is dark.
-    pub(crate) fn is_none(&self) -> bool {
-        *self == Self::NONE
-    }
-
     /// What a pixel of these terms shows of it, as factors of 1, cos t, -sin t, cos 2t, -sin 2t and so on.
     pub(crate) fn harmonics(&self, terms: &[HarmonicTerm]) -> [[f64; COEFFICIENTS]; 3] {
         let mut harmonics = [[0.0; COEFFICIENTS]; 3];
@@ -128,22 +114,8 @@ const fn of_term(at: usize) -> (usize, f64) {
     }
 }
 
-/// The part of the light that is reflected, by Schlick's formula.
-fn reflectance(facing: f64) -> f64 {
-    HEAD_ON + (1.0 - HEAD_ON) * (1.0 - facing.clamp(0.0, 1.0)).powi(5)
-}
-
-/// What each term of a light contributes to the harmonics of a pixel's gloss. `facing` is n·v.
-pub(crate) fn gloss_terms(facing: f64, reflected: [f64; 3]) -> [HarmonicTerm; TERMS] {
-    terms_of(reflectance(facing), reflected)
-}
-
-/// What it contributes in a direction of the table's frame.
-pub(crate) fn terms_along(direction: [f64; 3]) -> [HarmonicTerm; TERMS] {
-    terms_of(1.0, direction)
-}
-
-fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
+/// What each term of a light contributes to the harmonics of a pixel that shows it along a direction of the table's frame.
+pub(crate) fn terms_along([x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
     let legendre = derivatives(z);
     let mut terms = [HarmonicTerm {
         coefficient: 0,
@@ -152,7 +124,7 @@ fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
     let (mut re, mut im) = (1.0, 0.0);
     for m in 0..=GLOSS_ORDER {
         for l in m..=GLOSS_ORDER {
-            let value = part * legendre[l][m];
+            let value = legendre[l][m];
             let [a, b] = [value * re, value * im];
             if m == 0 {
                 terms[l * l].parts = [a, 0.0];
@@ -253,15 +225,10 @@ mod tests {
     #[test]
     fn light_comes_back_from_what_is_seen_of_it() {
         let frame = TableFrame::new(Elevation::measured(40.0).unwrap());
-        let table = TableLight::from_light(&light().rotated(&frame.rotation()));
-        let model = |material| ShadingModel {
-            frame,
-            diffuse: table.irradiance(),
-            gloss: table.scaled(|_, _| MIRROR),
-            material,
-        };
         for material in [MaterialKind::Diffuse, MaterialKind::Metal] {
-            let back = model(material).light().unwrap();
+            let back = ShadingModel::in_light(&light(), frame, material)
+                .light()
+                .unwrap();
             for (a, b) in back.coefficients().iter().zip(light().coefficients()) {
                 assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9));
             }
@@ -271,15 +238,10 @@ mod tests {
     #[test]
     fn white_metal_is_as_bright_as_a_lambertian_white_surface_in_even_light() {
         let frame = TableFrame::new(Elevation::assumed());
-        let even = TableLight::from_light(&ShLight::even(Order::TWO, [1.0; 3]));
+        let even = ShLight::even(Order::TWO, [1.0; 3]);
         for material in [MaterialKind::Diffuse, MaterialKind::Metal] {
-            let model = ShadingModel {
-                frame,
-                diffuse: even.irradiance(),
-                gloss: even.scaled(|_, _| MIRROR),
-                material,
-            };
-            let shown = model.harmonics([0.48, 0.36, 0.8]).base[1];
+            let model = ShadingModel::in_light(&even, frame, material);
+            let shown = model.harmonics([0.48, 0.36, 0.8])[1];
             assert!((shown[0] - PI).abs() < 1e-6, "{material:?} {shown:?}");
         }
     }
@@ -288,7 +250,7 @@ mod tests {
     fn terms_of_one_band_have_the_same_sum_of_squares_everywhere() {
         // The addition theorem: that sum is 2 l + 1 on the whole sphere, at every angle of the table.
         for direction in [[0.6, 0.48, 0.64], [0.0, -0.8, -0.6], [0.28, 0.96, 0.0]] {
-            let terms = gloss_terms(1.0, direction);
+            let terms = terms_along(direction);
             for l in 0..=GLOSS_ORDER {
                 for angle in [0.0_f64, 1.3] {
                     let sum: f64 = terms[l * l..(l + 1) * (l + 1)]
@@ -299,19 +261,10 @@ mod tests {
                             (term.parts[0] * cos - term.parts[1] * sin).powi(2)
                         })
                         .sum();
-                    let expected = HEAD_ON * HEAD_ON * (2 * l + 1) as f64;
+                    let expected = (2 * l + 1) as f64;
                     assert!((sum / expected - 1.0).abs() < 1e-9, "{l}: {sum}");
                 }
             }
         }
-    }
-
-    #[test]
-    fn gloss_shows_little_head_on_and_all_at_a_glancing_angle() {
-        let mut terms = [[0.0; TERMS]; 3];
-        terms[1][0] = 2.0;
-        let gloss = TableLight::new(terms);
-        let shown = |facing| gloss.harmonics(&gloss_terms(facing, [1.0, 0.0, 0.0]))[1][0];
-        assert!((shown(0.0) - 2.0).abs() < 1e-12 && (shown(1.0) - 0.08).abs() < 1e-12);
     }
 }

@@ -125,7 +125,6 @@ impl TurnFiles<'_> {
             "network": network,
             "residual": solution.residual(),
             "expected_error_deg": solution.expected_error_deg(),
-            "gloss": solution.gloss,
             "white": white,
         })
     }

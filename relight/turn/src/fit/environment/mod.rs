@@ -6,7 +6,6 @@ use relight_core::render::Surface;
 
 use crate::error::TurnError;
 use crate::fit::curve_statistics::CurveStatistics;
-use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
 use crate::model::harmonics::HarmonicTerm;
 use crate::model::lighting::{LAMBERTIAN_TERMS, TERMS, TableLight, terms_along};
@@ -43,7 +42,7 @@ pub fn fit_turn_light(
     for (pixel, &place) in curves.places().iter().enumerate() {
         let at = |planes: &Planes<3>| planes.pixel(place % width, place / width).map(f64::from);
         if at(normals) != [0.0; 3] {
-            statistics.push(CurveStatistics::new(curves, pixel, None));
+            statistics.push(CurveStatistics::new(curves, pixel));
             known.push(at(normals));
             colours.push(at(albedo));
         }
@@ -66,13 +65,14 @@ pub(crate) fn fit_model(
     frame: &TableFrame,
     material: MaterialKind,
 ) -> Option<ShadingModel> {
-    let terms: Vec<[HarmonicTerm; TERMS]> = (normals.iter())
-        .map(|&normal| {
-            terms_along(frame.to_table(match material {
-                MaterialKind::Diffuse => normal,
-                MaterialKind::Metal => reflected(normal),
-            }))
-        })
+    let mut model = ShadingModel {
+        frame: *frame,
+        shown: TableLight::new([[0.0; TERMS]; 3]),
+        material,
+    };
+    let normals = normals.iter();
+    let terms: Vec<[HarmonicTerm; TERMS]> = normals
+        .map(|&normal| terms_along(model.seen_along(normal)))
         .collect();
     let count = match material {
         MaterialKind::Diffuse => LAMBERTIAN_TERMS,
@@ -95,17 +95,8 @@ pub(crate) fn fit_model(
             *term = value;
         }
     }
-    let seen = TableLight::new(light);
-    let [diffuse, gloss] = match material {
-        MaterialKind::Diffuse => [seen, TableLight::NONE],
-        MaterialKind::Metal => [TableLight::NONE, seen],
-    };
-    Some(ShadingModel {
-        frame: *frame,
-        diffuse,
-        gloss,
-        material,
-    })
+    model.shown = TableLight::new(light);
+    Some(model)
 }
 
 /// The residual of the light that fits an evenly coloured Lambertian object of these normals best, over that of an even
@@ -128,7 +119,7 @@ pub(crate) fn relative_residual(
             along += statistics.term_along(channel, &constant);
             own += statistics.term_product(channel, &constant, &constant);
             all += statistics.energy(channel);
-            rest += statistics.residual_energy(channel, &model.harmonics(normal).base[channel]);
+            rest += statistics.residual_energy(channel, &model.harmonics(normal)[channel]);
         }
         if own > 0.0 {
             by_even += along * along / own;

@@ -3,31 +3,30 @@
 use rayon::prelude::*;
 use relight_core::light::NormalEquations;
 use relit_data::statistics::median;
-use relit_data::turn_light::MIN_MODULATION;
 use serde::Serialize;
 
-use crate::model::directions::half_sphere;
-use crate::model::harmonics::{COEFFICIENTS, LAMBERTIAN_COEFFICIENTS};
-use crate::model::shading::ShadingModel;
+use crate::model::harmonics::LAMBERTIAN_COEFFICIENTS;
 use crate::observe::curves::TurnCurves;
 use crate::observe::verdict::TurnVerdict;
 
-/// Largest share of the variation beyond the second harmonic, 0 to 1. By hand: above it the modulation is not that
-/// of a Lambertian surface.
-const MAX_BEYOND: f64 = 0.3;
 /// Least share of the pixels whose curves can be used, 0 to 1; with fewer the exposure was wrong. By hand.
 const MIN_OBSERVABLE: f64 = 0.1;
 /// Least mean light of a pixel that can be used, linear, of the three channels together. By hand: what is less is
 /// black.
 const MIN_LIGHT: f64 = 1e-5;
-/// Normals on which the modulation of a given light is measured. By hand.
-const NORMALS: usize = 100;
-/// Least coverage of a turn in unknown light, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
+/// Least coverage of a turn, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
 /// three of them.
 const MIN_COVERAGE_DEG: f64 = 330.0;
-/// Largest median of the errors that are expected in unknown light, degrees. Measured: of 15 synthetic turns those below are off
+/// Largest median of the errors that are expected, degrees. Measured: of 15 synthetic turns those below are off
 /// by 7 to 14 degrees, and those above by 14 to 22 (docs/results/turns.md).
 const MAX_EXPECTED_DEG: f64 = 15.0;
+
+/// What to do about a turn of which nearly all is clipped over half of the turn or more.
+const OVEREXPOSED: &str = "the object is overexposed: nearly all of it is clipped for half the turn or more; lower exposure or \
+                           gain, and capture again";
+/// What to do about a turn of which nearly all is black.
+const UNDEREXPOSED: &str = "the object is underexposed: nearly all of it is black; lengthen the exposure or add light, and \
+                            capture the turn again";
 
 /// How well the light of the turn determines normals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -36,13 +35,13 @@ pub(crate) struct Conditioning {
     pub(crate) modulation: f64,
     /// The median over the pixels of the part of a curve's variation that lies beyond the second harmonic.
     pub(crate) beyond: f64,
-    /// The effective value of the harmonics over the mean in a light that was given: the median over the normals that
-    /// face the viewer.
-    pub(crate) given_modulation: Option<f64>,
     /// How many degrees of the turn the frames cover.
     pub(crate) coverage_deg: f64,
     /// What follows.
     pub(crate) verdict: TurnVerdict,
+    /// What to do about an exposure that makes the turn useless.
+    #[serde(skip)]
+    pub(crate) exposure_advice: Option<&'static str>,
 }
 
 impl Conditioning {
@@ -62,31 +61,20 @@ impl Conditioning {
         let clipped = pixels
             .iter()
             .filter(|observable| matches!(observable, PixelLight::Clipped));
-        let verdict = if (observable as f64) < MIN_OBSERVABLE * pixels.len() as f64 {
-            if 2 * clipped.count() >= pixels.len() - observable {
-                TurnVerdict::Overexposed
-            } else {
-                TurnVerdict::Underexposed
-            }
-        } else if modulation < MIN_MODULATION {
-            TurnVerdict::TooEven
-        } else if beyond > MAX_BEYOND {
-            TurnVerdict::NotLambertian
-        } else {
-            TurnVerdict::Good
-        };
+        let is_useless = (observable as f64) < MIN_OBSERVABLE * pixels.len() as f64;
+        let is_white = 2 * clipped.count() >= pixels.len() - observable;
+        let advice = if is_white { OVEREXPOSED } else { UNDEREXPOSED };
         Self {
             modulation,
             beyond,
-            given_modulation: None,
             coverage_deg: curves.coverage_deg(),
-            verdict,
+            verdict: TurnVerdict::Good,
+            exposure_advice: is_useless.then_some(advice),
         }
     }
 
-    /// The same in a light that is not known, where the network of turns expects such an error of its normals, degrees, the
-    /// median.
-    pub(crate) fn by_network(self, expected_error_deg: f64) -> Self {
+    /// The same where such an error of the normals is expected, degrees, the median.
+    pub(crate) fn expecting(self, expected_error_deg: f64) -> Self {
         let verdict = if self.coverage_deg < MIN_COVERAGE_DEG {
             TurnVerdict::PartOfTurn
         } else if expected_error_deg > MAX_EXPECTED_DEG {
@@ -95,46 +83,6 @@ impl Conditioning {
             TurnVerdict::Good
         };
         Self { verdict, ..self }
-    }
-
-    /// Whether a light was given that is too even while the turn is not.
-    pub(crate) fn contradicts_given_light(&self) -> bool {
-        let given = self.given_modulation;
-        given.is_some_and(|given| given < MIN_MODULATION) && self.modulation >= MIN_MODULATION
-    }
-
-    /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is
-    /// too even determines no more than an even turn.
-    pub(crate) fn in_given(self, model: &ShadingModel) -> Self {
-        let modulations = half_sphere(NORMALS).map(|normal| {
-            let harmonics = model.harmonics(normal).base;
-            let sum = |coefficient: usize| {
-                harmonics
-                    .iter()
-                    .map(|harmonics| harmonics[coefficient])
-                    .sum::<f64>()
-            };
-            let harmonics: f64 = (1..COEFFICIENTS)
-                .map(|coefficient| sum(coefficient).powi(2))
-                .sum();
-            let mean = sum(0);
-            if mean > 0.0 {
-                (harmonics / 2.0).sqrt() / mean
-            } else {
-                0.0
-            }
-        });
-        let modulation = median(modulations).unwrap_or(0.0);
-        let is_even = modulation < MIN_MODULATION && self.verdict.is_fit();
-        Self {
-            given_modulation: Some(modulation),
-            verdict: if is_even {
-                TurnVerdict::TooEven
-            } else {
-                self.verdict
-            },
-            ..self
-        }
     }
 }
 

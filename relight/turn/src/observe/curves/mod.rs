@@ -226,12 +226,6 @@ impl TurnCurves {
         f64::from(Srgb::to_linear(CLIPPED_VALUE))
     }
 
-    /// The part of a pixel's light, 0 to 1, that is left out because it is clipped.
-    pub(crate) fn clipped_at(&self, pixel: usize) -> f64 {
-        let weights = self.weights(pixel).as_flattened();
-        1.0 - weights.iter().map(|&weight| f64::from(weight)).sum::<f64>() / weights.len() as f64
-    }
-
     /// The places of the pixels under the mask in the frame, row by row.
     pub(crate) fn places(&self) -> &[usize] {
         &self.places

@@ -1,11 +1,12 @@
-//! The gloss of a solved object, as the render layers take it, and the object as a file.
+//! A solved object as the render layers take it, and as a file.
 
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Planes, Rgb, beside};
 use relight_core::light::Normals;
-use relight_core::render::{Gloss, Surface};
+use relight_core::render::{Gloss, Surface, mirror_reflectance};
 
 use crate::error::TurnError;
+use crate::fit::smoothing::smoothed;
 use crate::fit::solution::TurnSolution;
 use crate::model::material::MaterialKind;
 use crate::observe::curves::TurnCurves;
@@ -14,32 +15,28 @@ use crate::observe::reading::ReadTurn;
 /// The standard deviation by which a mask is smoothed to find its outline, pixels. By hand: steps of some pixels vanish, and parts
 /// of three pixels stay.
 const OUTLINE: f32 = 1.5;
-/// How far that reaches, pixels.
-const REACH: i64 = 5;
+/// Smoothness (exponent of the lobe) of metal, which is not estimated. By convention.
+const METAL_SMOOTHNESS: f32 = 60.0;
 /// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
 const MIN_ALPHA: f32 = 0.02;
 
 impl TurnSolution {
-    /// The object as the render layers take it, with its gloss. Metal is black with a gloss
-    /// of its own colour.
+    /// The object as the render layers take it. Metal is black with a gloss of its own colour.
     ///
     /// # Errors
     /// None for maps of one size.
     pub fn surface(&self, curves: &TurnCurves) -> Result<Surface, TurnError> {
         let extent = curves.extent();
         let (normals, albedo) = (self.normals(curves), self.albedo(curves));
-        Ok(match (self.material(), self.gloss) {
-            (MaterialKind::Metal, Some(gloss)) => {
-                let colour = albedo.into_planes().map(|value| value * gloss.reflectance);
-                let smoothness = Planes::filled(extent, [gloss.smoothness]);
+        Ok(match self.material() {
+            MaterialKind::Metal => {
+                let reflectance = mirror_reflectance(1.0, METAL_SMOOTHNESS);
+                let colour = albedo.into_planes().map(|value| value * reflectance);
+                let smoothness = Planes::filled(extent, [METAL_SMOOTHNESS]);
                 let black = Rgb::new(Planes::zeros(extent));
                 Surface::new(normals, black, Some(Gloss::new(colour, smoothness)?))?
             }
-            (_, gloss) => {
-                let gloss = gloss
-                    .map(|gloss| Gloss::even(extent, [gloss.reflectance; 3], gloss.smoothness));
-                Surface::new(normals, albedo, gloss)?
-            }
+            MaterialKind::Diffuse => Surface::new(normals, albedo, None)?,
         })
     }
 
@@ -90,7 +87,7 @@ fn coverage(mask: &Planes<1>) -> Planes<1> {
         return mask.clone().map(whole);
     }
     let Extent { width, height } = mask.extent();
-    let smooth = smoothed(mask);
+    let smooth = smoothed(mask, OUTLINE);
     let at = |x: usize, y: usize| smooth.pixel(x, y)[0];
     Planes::from_fn(mask.extent(), |x, y| {
         let right = (x + 1).min(width - 1);
@@ -102,31 +99,6 @@ fn coverage(mask: &Planes<1>) -> Planes<1> {
         let thin = mask.pixel(x, y)[0] * at(x, y);
         [whole((0.5 + beyond).clamp(0.0, 1.0).max(thin))]
     })
-}
-
-/// The mean of each pixel's surroundings, weighted as a Gaussian.
-fn smoothed(mask: &Planes<1>) -> Planes<1> {
-    let Extent { width, height } = mask.extent();
-    let weights: Vec<f32> = (-REACH..=REACH)
-        .map(|step| (-0.5 * (step as f32 / OUTLINE).powi(2)).exp())
-        .collect();
-    let all: f32 = weights.iter().sum();
-    let along = |source: &Planes<1>, across: bool| {
-        Planes::from_fn(source.extent(), |x, y| {
-            let taps = (-REACH..=REACH).zip(&weights).map(|(step, weight)| {
-                let line =
-                    |at: usize, size: usize| (at as i64 + step).clamp(0, size as i64 - 1) as usize;
-                let [x, y] = if across {
-                    [line(x, width), y]
-                } else {
-                    [x, line(y, height)]
-                };
-                weight * source.pixel(x, y)[0]
-            });
-            [taps.sum::<f32>() / all]
-        })
-    };
-    along(&along(mask, true), false)
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use crate::fit::probe_light::ProbeLight;
 use crate::model::frame::FactSource;
 use crate::solving::SolvedTurn;
 
-/// Residual of a given light, over the energy of the variation, from which it is not that of the turn. By hand.
-const MAX_RESIDUAL: f64 = 0.4;
+/// Residual of a given light, over the energy of the variation, from which it is not that of the turn. Measured: on nine synthetic
+/// turns 0.02 to 0.80 in their light, and 0.89 to 1.86 in the same light turned by 90 or 180 degrees.
+const MAX_RESIDUAL: f64 = 0.85;
 
 impl SolvedTurn {
     /// Its warnings.
@@ -32,11 +33,7 @@ impl SolvedTurn {
         warnings.extend(self.solution.verdict().advice().map(str::to_owned));
         let residual = self.solution.residual();
         let is_bad = residual > MAX_RESIDUAL || residual.is_nan();
-        if self.solution.conditioning.contradicts_given_light() {
-            let odd = "the given light hardly changes over the turn, but the object's brightness does: it is not the light of \
-                 this turn";
-            warnings.push(odd.to_owned());
-        } else if self.solution.measured.is_some() && is_bad {
+        if self.solution.measured.is_some() && is_bad {
             warnings.push(format!(
                 "the residual in the given light is {:.0} % of the variation: check that it is this turn's light, in the \
                  viewer's frame at angle 0",
