@@ -58,8 +58,9 @@ const EVEN: f32 = 0.25;
 const EVEN_REACH: usize = 3;
 /// Its brightness is less likely the object's, as a logarithm.
 const NOT_OBJECT: f32 = -1.0;
-/// Smaller parts are not shade, as a share of the object.
-const LEAST_SHADED: f64 = 0.002;
+/// Smaller parts are not shade, as a share of the object, and parts that are at most twice so many pixels wide.
+const LEAST_SHADED: f64 = 0.02;
+const SHADED_WIDTH: usize = 2;
 /// Of what is around a part of the table that is in shade all the time, at least this share is in shade most of it.
 const NEXT_TO: f64 = 0.2;
 
@@ -105,6 +106,8 @@ pub(crate) struct TableModel {
     by_course: Vec<f32>,
     /// The pixels that show the table or the object, and never the room.
     pub(crate) on_disc: Bitmap,
+    /// The pixels that are as bright as the unshaded table in their brightest frames, and the object is not.
+    as_unshaded: Bitmap,
     /// Pixels of the object that was found which are the table in shade.
     shaded: Bitmap,
     /// The pixels that are about as bright as the unshaded table in the frames in which they are brightest.
@@ -143,7 +146,8 @@ impl TableModel {
             .map(|darker| (darker - of_table.middle) / of_table.spread)
             .collect();
         let as_bright = far.map(|at, _| off[at].abs() <= AS_BRIGHT);
-        let shaded = shaded(&off, &by_brightness, seen.object);
+        let as_unshaded = far.map(|at, _| off[at].abs() <= SAME && by_brightness[at] <= NOT_OBJECT);
+        let shaded = shaded(&off, &as_unshaded, seen.object);
         let both = by_course.iter().zip(&by_brightness);
         let ratio: Vec<f32> = both
             .map(|(course, brightness)| course + brightness.max(-AS_DARK))
@@ -165,6 +169,7 @@ impl TableModel {
         });
         Some(Self {
             ratio: ratio.collect(),
+            as_unshaded,
             shaded,
             by_course,
             on_disc,
@@ -197,6 +202,7 @@ impl TableModel {
             by_course: mean(&self.by_course),
             on_disc: all(&self.on_disc),
             as_bright: all(&self.as_bright),
+            as_unshaded: all(&self.as_unshaded),
             shaded: all(&self.shaded),
             size: half,
         }
@@ -214,7 +220,7 @@ impl TableModel {
             .map(|at, alike| alike && self.by_course[at] < 0.0);
         SeenTable {
             as_bright: by_course.and(&self.alike(LIKELY)).and(&self.as_bright),
-            like: by_course.or(&self.shaded),
+            like: by_course.or(&self.shaded).or(&self.as_unshaded),
             shaded: self.shaded.clone(),
         }
     }
@@ -325,7 +331,7 @@ fn log_ratios(values: &[f32], table: &[usize], object: &Bitmap) -> Option<Vec<f3
 /// The parts of an object that are the table in a shade that lasts for most of the turn, as under a sun: even there,
 /// its brightest frames show it without shade. It is as bright then as the table everywhere, and evenly so, as one plane
 /// is. `off` is by how much each pixel is darker, in the table's spreads.
-fn shaded(off: &[f32], by_brightness: &[f32], object: &Bitmap) -> Bitmap {
+fn shaded(off: &[f32], as_unshaded: &Bitmap, object: &Bitmap) -> Bitmap {
     let width = object.width();
     let reach = EVEN_REACH as isize;
     let is_even = |at: usize| {
@@ -335,12 +341,11 @@ fn shaded(off: &[f32], by_brightness: &[f32], object: &Bitmap) -> Bitmap {
             .all(|other| (other - off[at]).abs() <= EVEN)
     };
     let outline = object.or(&enclosed(object, width));
-    let alike = outline.map(|at, bit| {
-        bit && off[at].abs() <= SAME && by_brightness[at] <= NOT_OBJECT && is_even(at)
-    });
     let least = (object.count() as f64 * LEAST_SHADED) as u64;
-    let shaded = alike
-        .opened(1)
+    let shaded = outline
+        .and(as_unshaded)
+        .map(|at, bit| bit && is_even(at))
+        .opened(SHADED_WIDTH)
         .parts_where(Connectivity::Eight, |part, _| part.area >= least);
     if shaded.count() == 0 {
         return shaded;
@@ -566,15 +571,15 @@ mod tests {
             };
             (0..3600).map(level).collect()
         };
-        let unlike = vec![-2.0; 3600];
-        let found = shaded(&off(false), &unlike, &object);
+        let as_unshaded = all.map(|at, _| shade(at) && !core(at));
+        let found = shaded(&off(false), &as_unshaded, &object);
         // Between the two a pixel may show something of both.
         let wanted = all.map(|at, _| core(at) || square(at, 10, 20));
         assert_eq!(wanted.minus(&found).count(), 0);
         assert_eq!(found.minus(&all.map(|at, _| shade(at))).count(), 0);
-        assert_eq!(shaded(&off(true), &unlike, &object).count(), 0);
-        let alike = vec![0.0; 3600];
-        assert_eq!(shaded(&off(false), &alike, &object).count(), 0);
+        assert_eq!(shaded(&off(true), &as_unshaded, &object).count(), 0);
+        let none = object.minus(&object);
+        assert_eq!(shaded(&off(false), &none, &object).count(), 0);
     }
 
     #[test]
