@@ -126,7 +126,7 @@ impl Bitmap {
     }
 
     /// The bitmap `factor` times as large, cut to `width` x `height`.
-    pub(super) fn enlarged(&self, factor: usize, (width, height): (usize, usize)) -> Self {
+    pub(crate) fn enlarged(&self, factor: usize, (width, height): (usize, usize)) -> Self {
         let is_set = |at: usize| {
             let (x, y) = (at % width / factor, at / width / factor);
             x < self.width && self.bits.get(y * self.width + x) == Some(&true)

@@ -273,6 +273,7 @@ mod tests {
             outline_of_turn: 0.8,
             contradicted: false,
             leaks: Vec::new(),
+            whiskers: Vec::new(),
             missing: Vec::new(),
             holes: Vec::new(),
         }
@@ -294,6 +295,10 @@ mod tests {
                 ..shape()
             },
             ShapeCheck {
+                whiskers: region(60),
+                ..shape()
+            },
+            ShapeCheck {
                 missing: region(500),
                 ..shape()
             },
@@ -311,7 +316,7 @@ mod tests {
             assert_eq!(found.reasons.len(), 1, "{:?}", found.reasons);
             reasons.extend(found.reasons);
         }
-        assert_eq!(reasons.len(), 4, "{reasons:?}");
+        assert_eq!(reasons.len(), 5, "{reasons:?}");
         let unknown = MaskReport::from_shape(None);
         assert_eq!(
             (unknown.verdict, unknown.reasons.len()),

@@ -9,12 +9,16 @@ use serde::Serialize;
 
 use crate::bitmap::{Bitmap, Component, Connectivity};
 use crate::turn::statistics::TurnField;
+use crate::turn::thin_parts::thin_parts;
 use crate::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_with};
 
 /// Narrower differences of the shape are differences of the edge, pixels of the turn's statistics.
 const NARROW: usize = 2;
 /// Smaller differences of the shape, as a share of the mask's area, are not regions.
 const SMALL: f64 = 0.001;
+/// A thin part of the mask that does not belong to the object is a whisker from this length on, as a share of the
+/// frame's width.
+const WHISKER: f64 = 0.04;
 /// A part of the mask with more than this share of table is not an object that the frame's border cuts off.
 const ON_TABLE: f64 = 0.5;
 
@@ -40,6 +44,9 @@ pub struct ShapeCheck {
     pub contradicted: bool,
     /// Parts of the mask that show the background, largest first.
     pub leaks: Vec<DoubtfulRegion>,
+    /// Long thin parts of the mask that show what is on both sides of them, as pieces of the table's rim do, largest
+    /// first.
+    pub whiskers: Vec<DoubtfulRegion>,
     /// Parts outside the mask that show the object, largest first.
     pub missing: Vec<DoubtfulRegion>,
     /// Holes in the mask that show the object, largest first.
@@ -52,7 +59,12 @@ impl ShapeCheck {
     pub fn enlarged(mut self, by: u32) -> Self {
         let area = u64::from(by) * u64::from(by);
         self.area_px *= area;
-        let regions = [&mut self.leaks, &mut self.missing, &mut self.holes];
+        let regions = [
+            &mut self.leaks,
+            &mut self.whiskers,
+            &mut self.missing,
+            &mut self.holes,
+        ];
         for region in regions.into_iter().flatten() {
             let Rect { x, y, w, h } = region.bounds;
             let signed = i32::try_from(by).unwrap_or(i32::MAX);
@@ -90,15 +102,13 @@ impl<'a> MaskCheck<'a> {
     }
 
     /// Compares the mask's shape with that which the turn shows on `frame`, the one on which the mask was
-    /// made, with this effort. `None` if the turn says nothing: hardly anything moves, or what it shows
-    /// alone is not an object.
+    /// made, with this effort. `None` if the turn says nothing: what it shows alone is not an object, or hardly
+    /// anything moves and neither the table nor what is overexposed is seen in the mask.
     ///
     /// # Errors
     /// As [`segment_with`] a turn and no hints.
     pub fn shape(&self, frame: &RgbImage, effort: Effort) -> Result<Option<ShapeCheck>, MaskError> {
-        if !self.turn.moves() {
-            return Ok(None);
-        }
+        let moves = self.turn.moves();
         let (none, settings) = (Hints::default(), SegmentSettings::default());
         let own = match segment_with(frame, Some(self.turn), &none, &settings, effort) {
             Err(MaskError::Empty | MaskError::Everything | MaskError::FrameSize { .. }) => {
@@ -113,24 +123,38 @@ impl<'a> MaskCheck<'a> {
         let differing = leaks.count() + missing.count();
         // The curves compare a part with the rest of the mask, which is no witness where it is the smaller one.
         let witnessed = 2 * leaks.count() < self.mask.count();
-        let background = |parts: &Bitmap, is: Option<bool>| {
-            self.shown(parts, |turn, part, mask| {
-                turn.is_background(part, mask) == is
-            })
+        let clear = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
+            turn.is_background(part, mask)
+                .filter(|found| !found || turn.is_clearly_background(part, mask, moves))
         };
-        let undecided = background(&leaks, None);
-        let leaks = background(&leaks, Some(true));
-        let missing = self.shown(&missing, TurnField::belongs);
-        // Whatever the turn's own mask says of a hole, the picture in it decides.
-        let filled = background(&in_hole.opened(wide), Some(false));
+        let undecided = self.shown(&leaks, |turn, part, mask| clear(turn, part, mask).is_none());
+        let leaks = self.shown(&leaks, |turn, part, mask| {
+            clear(turn, part, mask) == Some(true)
+        });
+        let leaks = leaks.or(&self.table_seen());
+        let whiskers = self.whiskers(&own);
+        if !moves && leaks.count() + whiskers.count() == 0 {
+            return Ok(None);
+        }
+        let (missing, filled) = if moves {
+            // Whatever the turn's own mask says of a hole, the picture in it decides.
+            let is_filled = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
+                turn.is_background(part, mask) == Some(false)
+            };
+            let filled = self.shown(&in_hole.opened(wide), is_filled);
+            (self.shown(&missing, TurnField::belongs), filled)
+        } else {
+            (self.mask.minus(&self.mask), self.mask.minus(&self.mask))
+        };
         let undisputed = leaks.count() + missing.count() + undecided.count() == 0;
         let least = self.mask.count() as f64 * SMALL;
         Ok(Some(ShapeCheck {
             area_px: self.mask.count(),
             outline: self.turn.outline(&self.mask),
             outline_of_turn: self.turn.outline(&own),
-            contradicted: witnessed && differing > 0 && undisputed,
+            contradicted: !moves || witnessed && differing > 0 && undisputed,
             leaks: regions(&leaks, least),
+            whiskers: regions(&whiskers, 0.0),
             missing: regions(&missing, least),
             holes: regions(&filled, least),
         }))
@@ -145,6 +169,41 @@ impl<'a> MaskCheck<'a> {
             let part = || self.turn.downscaled(&part());
             component.area as f64 >= least && says(&self.turn.fine, &part(), &object)
         })
+    }
+
+    /// Parts of the mask that the table's model takes for the table, whatever a cut says.
+    fn table_seen(&self) -> Bitmap {
+        let object = self.turn.downscaled(&self.mask);
+        let Some(table) = &self.turn.fine.seen_table else {
+            return self.mask.minus(&self.mask);
+        };
+        let table = table.as_bright.or(&table.shaded);
+        let wide = table
+            .and(&object)
+            .opened(NARROW)
+            .dilated(NARROW)
+            .and(&object);
+        self.shown(&self.upscaled(&wide), TurnField::shows_table)
+    }
+
+    /// Thin parts of the mask that neither the turn's own has nor the object.
+    fn whiskers(&self, own: &Bitmap) -> Bitmap {
+        let object = self.turn.downscaled(&self.mask);
+        let least = (object.width() as f64 * WHISKER).round() as usize;
+        let found = thin_parts(&self.turn.series, &object, least);
+        let beyond = found.minus(&self.turn.downscaled(own).dilated(1));
+        let long = |part: &Component, _: &dyn Fn() -> Bitmap| {
+            part.bounds.w.max(part.bounds.h) as usize >= least
+        };
+        let long = beyond.parts_where(Connectivity::Eight, long);
+        self.upscaled(&long)
+    }
+
+    /// A part of the mask at the size of the statistics in that of the frames.
+    fn upscaled(&self, part: &Bitmap) -> Bitmap {
+        let (width, height) = self.turn.full;
+        let size = (width as usize, height as usize);
+        part.enlarged(self.turn.factor(), size).and(&self.mask)
     }
 
     /// What the turn takes for background in the mask, without the parts at the frame's border that are the object:
@@ -217,6 +276,7 @@ mod tests {
             outline_of_turn: 0.6,
             contradicted: false,
             leaks: vec![region],
+            whiskers: Vec::new(),
             missing: Vec::new(),
             holes: vec![region],
         };

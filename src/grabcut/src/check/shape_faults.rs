@@ -2,9 +2,11 @@
 
 use crate::{DoubtfulRegion, ShapeCheck};
 
-/// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
-/// share of its area, where all of the turn is looked at.
+/// Parts of the object that are not in the mask, or holes in it, may have this share of its area, where all of the turn
+/// is looked at.
 const MAX_REGION: f64 = 0.01;
+/// The same of parts of the mask that are background: what they show is known better.
+const MAX_LEAK: f64 = 0.0025;
 /// The same of a look at a few frames, which takes shadows for parts of the object.
 const MAX_REGION_OF_A_LOOK: f64 = 0.03;
 /// The mask's outline follows what moves at least so well, compared with the turn's own.
@@ -23,12 +25,19 @@ impl ShapeCheck {
     /// Why the mask is not that of the object, one sentence each; empty if it is. For a turn that was looked
     /// at as a whole.
     pub fn faults(&self) -> Vec<String> {
-        faults(self, MAX_REGION)
+        let mut faults = faults(self, MAX_LEAK, MAX_REGION);
+        if !self.whiskers.is_empty() && !self.is_better_than_turn() {
+            faults.push(format!(
+                "thin parts of the mask that are not the object, as pieces of the table's rim, at {}: mark them black, in --edit or in seeds",
+                places(&self.whiskers)
+            ));
+        }
+        faults
     }
 
     /// [`Self::faults`] after a look at only a few frames of the turn.
     pub fn quick_faults(&self) -> Vec<String> {
-        faults(self, MAX_REGION_OF_A_LOOK)
+        faults(self, MAX_REGION_OF_A_LOOK, MAX_REGION_OF_A_LOOK)
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
@@ -47,13 +56,18 @@ impl ShapeCheck {
             || share(&self.missing) + share(&self.holes) > SOMETHING_ELSE
     }
 
+    /// Whether the mask's outline follows what moves better than the turn's own: then differences are the turn's mistakes.
+    fn is_better_than_turn(&self) -> bool {
+        self.outline > BETTER_OUTLINE * self.outline_of_turn
+    }
+
     fn follows_what_moves(&self) -> bool {
         self.outline >= MIN_OUTLINE * self.outline_of_turn
     }
 }
 
-fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
-    if shape.outline > BETTER_OUTLINE * shape.outline_of_turn {
+fn faults(shape: &ShapeCheck, most_leak: f64, most_region: f64) -> Vec<String> {
+    if shape.is_better_than_turn() {
         return Vec::new();
     }
     let mut faults = Vec::new();
@@ -65,17 +79,28 @@ fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
     }
     let area = shape.area_px as f64;
     let named = [
-        (&shape.leaks, "background in the mask", "mark it black"),
-        (&shape.missing, "object outside the mask", "mark it white"),
+        (
+            &shape.leaks,
+            most_leak,
+            "background in the mask",
+            "mark it black",
+        ),
+        (
+            &shape.missing,
+            most_region,
+            "object outside the mask",
+            "mark it white",
+        ),
         (
             &shape.holes,
+            most_region,
             "holes of the mask in the object",
             "mark them white",
         ),
     ];
-    for (regions, what, remedy) in named {
+    for (regions, most, what, remedy) in named {
         let px: u64 = regions.iter().map(|region| region.px).sum();
-        if px as f64 > most_region * area {
+        if px as f64 > most * area {
             faults.push(format!(
                 "{what}, {px} pixels ({:.1} % of it), at {}: {remedy}, in --edit or in seeds",
                 100.0 * px as f64 / area,
@@ -118,9 +143,21 @@ mod tests {
             outline_of_turn: 0.9,
             contradicted: false,
             leaks: of(leaks),
+            whiskers: Vec::new(),
             missing: of(missing),
             holes: of(holes),
         }
+    }
+
+    #[test]
+    fn background_in_a_mask_counts_sooner_than_what_it_lacks_and_whiskers_count_always() {
+        assert!(shape([2, 9, 9]).faults().is_empty());
+        assert_eq!(shape([4, 9, 9]).faults().len(), 1);
+        assert!(shape([4, 9, 9]).quick_faults().is_empty());
+        let mut with_whisker = shape([0; 3]);
+        with_whisker.whiskers = with_whisker.leaks.clone();
+        assert_eq!(with_whisker.faults().len(), 1);
+        assert!(with_whisker.quick_faults().is_empty());
     }
 
     #[test]

@@ -15,8 +15,17 @@ const MOSTLY: f64 = 0.5;
 /// One looks through an opening whose outline is at least this share as strong as the object's.
 const OPENING_OUTLINE: f32 = 0.5;
 
+/// An edge in a mask that is at least so strong is one.
+const SURE_EDGE: f32 = 0.9;
+/// And there is none where it is at most this share as strong.
+const NO_EDGE: f32 = 0.7;
+/// What moves as the background does is so clearly from here on, between the object's changes (0) and its (1).
+const CLEARLY: f32 = 0.9;
+/// An average brightness L that may be overexposed in places.
+const NEARLY_WHITE: f32 = 95.0;
+
 /// What is not in the object, and enclosed by it but for a narrow neck.
-fn enclosed(object: &Bitmap, width: usize) -> Bitmap {
+pub(crate) fn enclosed(object: &Bitmap, width: usize) -> Bitmap {
     let neck = ((width as f64 * NECK).round() as usize).max(1);
     let closed = object.closed(neck);
     closed.or(&closed.holes()).minus(object)
@@ -40,7 +49,10 @@ impl TurnField {
         let beside = self.beside(part, &rest);
         let like_table = self.is_like_table(part, &beside);
         // Through one opening both the table and what is behind it may be seen.
-        let above = self.like_table.as_ref().map(|table| part.minus(table));
+        let above = self
+            .seen_table
+            .as_ref()
+            .map(|table| part.minus(&table.like));
         let above = above.filter(|above| above.count() > 0 && !like_table);
         let above = above.as_ref().unwrap_or(part);
         let moves = self
@@ -64,8 +76,8 @@ impl TurnField {
 
     /// Whether a part behaves like the table over the turn.
     fn is_like_table(&self, part: &Bitmap, beside: &Bitmap) -> bool {
-        if let Some(like_table) = &self.like_table {
-            return part.share_in(like_table) > MOSTLY;
+        if let Some(table) = &self.seen_table {
+            return part.share_in(&table.like) > MOSTLY;
         }
         // What lies before the table brightens with it, and a dark part of the object with the object.
         let surface = &self.table.surface;
@@ -76,6 +88,64 @@ impl TurnField {
                 .temporal_evidence
                 .nearer(part, surface, beside)
                 .unwrap_or(true)
+    }
+
+    /// Whether a part of a mask that seems to be background is so clearly that the mask may be called wrong. In a room
+    /// in which nothing moves, only the table and what is overexposed are clear.
+    pub(crate) fn is_clearly_background(&self, part: &Bitmap, mask: &Bitmap, moves: bool) -> bool {
+        let beside = self.beside(part, &mask.minus(part));
+        if self.is_like_table(part, &beside) {
+            return self.shows_table(part, mask);
+        }
+        let above = self
+            .seen_table
+            .as_ref()
+            .map(|table| part.minus(&table.like));
+        let above = above.as_ref().unwrap_or(part);
+        if above.share_in(&self.white) > MOSTLY {
+            // A white object may be overexposed as well.
+            return self.mean_light(&beside) < NEARLY_WHITE;
+        }
+        let ground = self.ground(above, mask);
+        match self
+            .temporal_evidence
+            .towards_ground(above, &beside, &ground)
+        {
+            _ if !moves => false,
+            Some(towards) => towards >= CLEARLY,
+            None => self.ends_without_edge(part, mask),
+        }
+    }
+
+    /// Whether the table is seen in a part of a mask that is like it by the model: it is as bright as the unshaded
+    /// table, and an edge between it and the rest of the mask persists over the turn, or no edge is where the mask ends.
+    /// A dark part of the object may look like the table, but has other edges.
+    pub(crate) fn shows_table(&self, part: &Bitmap, mask: &Bitmap) -> bool {
+        let Some(table) = &self.seen_table else {
+            return self.ends_without_edge(part, mask);
+        };
+        let edge = self.boundary(part, &mask.minus(part));
+        let has_edge = edge.is_none_or(|edge| edge >= SURE_EDGE);
+        part.share_in(&table.shaded) > MOSTLY
+            || has_edge && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
+            || self.ends_without_edge(part, mask)
+    }
+
+    /// Whether the edge of a part of a mask with the rest of the mask persists over the turn, and the one where the mask
+    /// ends does not.
+    fn ends_without_edge(&self, part: &Bitmap, mask: &Bitmap) -> bool {
+        let within = self.boundary(part, &mask.minus(part));
+        let ends = self.boundary(part, &mask.inverted());
+        within
+            .zip(ends)
+            .is_some_and(|(within, ends)| ends <= NO_EDGE * within)
+    }
+
+    /// The average brightness L of a part.
+    fn mean_light(&self, part: &Bitmap) -> f32 {
+        let light = self.light();
+        let pixels = part.bits().iter().zip(&light).filter(|(bit, _)| **bit);
+        pixels.map(|(_, light)| light).sum::<f32>() / part.count().max(1) as f32
     }
 
     /// Whether a part outside the object shows that it belongs to it: it does not move, is neither room nor table,

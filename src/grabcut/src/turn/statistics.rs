@@ -14,7 +14,7 @@ use super::frame_shift;
 use super::pixel_series::PixelSeries;
 use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
-use super::table_model::{TableModel, TurnObservations};
+use super::table_model::{SeenTable, TableModel, TurnObservations};
 use super::temporal_evidence::{Curves, TemporalEvidence, luminance};
 use super::thin_parts::thin_parts;
 use crate::MaskError;
@@ -205,8 +205,8 @@ pub(crate) struct TurnField {
     pub(crate) table: Turntable,
     evidence: Vec<f32>,
     pub(crate) temporal_evidence: TemporalEvidence,
-    /// Pixels that are more likely table than object by the table's model; none without one.
-    pub(crate) like_table: Option<Bitmap>,
+    /// What the table's model takes for the table; none without one.
+    pub(crate) seen_table: Option<SeenTable>,
     /// Pixels that are white in nearly every frame.
     pub(crate) white: Bitmap,
 }
@@ -268,7 +268,7 @@ impl TurnField {
             backdrop: backdrop.alike,
             evidence: backdrop.evidence,
             temporal_evidence: curves.finish(),
-            like_table: None,
+            seen_table: None,
             white: white(frames, size),
             table,
             features,
@@ -332,7 +332,7 @@ impl TurnField {
         }
         let surely = model.alike(SURELY_TABLE).or(&self.table.surface);
         self.backdrop = self.backdrop.minus(&model.on_disc).or(&surely);
-        self.like_table = Some(model.like_table());
+        self.seen_table = Some(model.seen());
     }
 
     /// The average brightness L of each pixel.

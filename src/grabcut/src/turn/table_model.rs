@@ -8,6 +8,7 @@
 use crate::bitmap::{Bitmap, Connectivity};
 
 use super::disc::Disc;
+use super::enclosed_regions::enclosed;
 use super::pixel_series::PixelSeries;
 use super::subspace::Subspace;
 
@@ -44,6 +45,24 @@ const FEW_FRAMES: usize = 8;
 const NOISE: f32 = 0.001;
 /// Units of the density for one of the logarithm of the brightness.
 const BRIGHTNESS: f32 = 2.0;
+
+/// What is as bright as the unshaded table differs from its middle by at most so many times its spread.
+const AS_BRIGHT: f32 = 2.5;
+/// And is more likely the table by at least this logarithm.
+const LIKELY: f32 = 1.0;
+
+/// The table in shade differs from its middle by at most so many spreads, and by at most so many from its pixels that
+/// are so many pixels away.
+const SAME: f32 = 1.2;
+const EVEN: f32 = 0.25;
+const EVEN_REACH: usize = 3;
+/// Its brightness is less likely the object's, as a logarithm.
+const NOT_OBJECT: f32 = -1.0;
+/// Smaller parts are not shade, as a share of the object, and parts that are at most twice so many pixels wide.
+const LEAST_SHADED: f64 = 0.02;
+const SHADED_WIDTH: usize = 2;
+/// Of what is around a part of the table that is in shade all the time, at least this share is in shade most of it.
+const NEXT_TO: f64 = 0.2;
 
 /// The logarithm of the distance is counted in bins of this width, from here on.
 const BIN: f32 = 0.25;
@@ -87,6 +106,12 @@ pub(crate) struct TableModel {
     by_course: Vec<f32>,
     /// The pixels that show the table or the object, and never the room.
     pub(crate) on_disc: Bitmap,
+    /// The pixels that are as bright as the unshaded table in their brightest frames, and the object is not.
+    as_unshaded: Bitmap,
+    /// Pixels of the object that was found which are the table in shade.
+    shaded: Bitmap,
+    /// The pixels that are about as bright as the unshaded table in the frames in which they are brightest.
+    as_bright: Bitmap,
     size: (usize, usize),
 }
 
@@ -115,6 +140,14 @@ impl TableModel {
         let core = seen.object.eroded(2);
         let by_course = log_ratios(&logs, &taken, &core)?;
         let by_brightness = log_ratios(&darker, &taken, &core)?;
+        let of_table = TableDensity::learn(taken.iter().map(|&at| darker[at]))?;
+        let off: Vec<f32> = darker
+            .iter()
+            .map(|darker| (darker - of_table.middle) / of_table.spread)
+            .collect();
+        let as_bright = far.map(|at, _| off[at].abs() <= AS_BRIGHT);
+        let as_unshaded = far.map(|at, _| off[at].abs() <= SAME && by_brightness[at] <= NOT_OBJECT);
+        let shaded = shaded(&off, &as_unshaded, seen.object);
         let both = by_course.iter().zip(&by_brightness);
         let ratio: Vec<f32> = both
             .map(|(course, brightness)| course + brightness.max(-AS_DARK))
@@ -127,14 +160,20 @@ impl TableModel {
                 part.area >= MIN_SAMPLES as u64 && pixels().and(&table).count() > 0
             });
         let on_disc = on_disc(&seen_table, &far);
-        let ratio = ratio
-            .iter()
-            .zip(on_disc.bits())
-            .map(|(&ratio, &on_disc)| ratio.clamp(-STRENGTH, if on_disc { STRENGTH } else { 0.0 }));
+        let ratio = ratio.iter().enumerate().map(|(at, &ratio)| {
+            match (shaded.bits()[at], on_disc.bits()[at]) {
+                (true, _) => -STRENGTH,
+                (_, true) => ratio.clamp(-STRENGTH, STRENGTH),
+                (_, false) => ratio.clamp(-STRENGTH, 0.0),
+            }
+        });
         Some(Self {
             ratio: ratio.collect(),
+            as_unshaded,
+            shaded,
             by_course,
             on_disc,
+            as_bright,
             size: series.size(),
         })
     }
@@ -154,11 +193,17 @@ impl TableModel {
             four.map(|four| four.map(|at| values[at]).iter().sum::<f32>() / 4.0)
                 .collect()
         };
-        let on_disc = (0..pixels).map(|at| four(at).iter().all(|&at| self.on_disc.bits()[at]));
+        let all = |bitmap: &Bitmap| {
+            let all = (0..pixels).map(|at| four(at).iter().all(|&at| bitmap.bits()[at]));
+            Bitmap::new((half.0 as u32, half.1 as u32), all)
+        };
         Self {
             ratio: mean(&self.ratio),
             by_course: mean(&self.by_course),
-            on_disc: Bitmap::new((half.0 as u32, half.1 as u32), on_disc),
+            on_disc: all(&self.on_disc),
+            as_bright: all(&self.as_bright),
+            as_unshaded: all(&self.as_unshaded),
+            shaded: all(&self.shaded),
             size: half,
         }
     }
@@ -168,11 +213,28 @@ impl TableModel {
         self.on_disc.map(|at, _| self.ratio[at] < -least)
     }
 
-    /// The pixels that are more likely table than object by their course too.
-    pub(crate) fn like_table(&self) -> Bitmap {
-        self.alike(0.0)
-            .map(|at, alike| alike && self.by_course[at] < 0.0)
+    /// What the model takes for the table.
+    pub(crate) fn seen(&self) -> SeenTable {
+        let by_course = self
+            .alike(0.0)
+            .map(|at, alike| alike && self.by_course[at] < 0.0);
+        SeenTable {
+            as_bright: by_course.and(&self.alike(LIKELY)).and(&self.as_bright),
+            like: by_course.or(&self.shaded).or(&self.as_unshaded),
+            shaded: self.shaded.clone(),
+        }
     }
+}
+
+/// Pixels that a table's model takes for the table.
+#[derive(Debug)]
+pub(crate) struct SeenTable {
+    /// All that are more likely table than object.
+    pub(crate) like: Bitmap,
+    /// Those that are so for sure by their course, and as bright as the unshaded table.
+    pub(crate) as_bright: Bitmap,
+    /// Those that are in shade for most of the turn.
+    pub(crate) shaded: Bitmap,
 }
 
 /// What may be table.
@@ -264,6 +326,40 @@ fn log_ratios(values: &[f32], table: &[usize], object: &Bitmap) -> Option<Vec<f3
     let of_object = ObjectDensity::learn(core.map(|(_, &value)| value), &of_table);
     let ratio = |&value: &f32| (of_object.at(value) / of_table.at(value)).ln();
     Some(values.iter().map(ratio).collect())
+}
+
+/// The parts of an object that are the table in a shade that lasts for most of the turn, as under a sun: even there,
+/// its brightest frames show it without shade. It is as bright then as the table everywhere, and evenly so, as one plane
+/// is. `off` is by how much each pixel is darker, in the table's spreads.
+fn shaded(off: &[f32], as_unshaded: &Bitmap, object: &Bitmap) -> Bitmap {
+    let width = object.width();
+    let reach = EVEN_REACH as isize;
+    let is_even = |at: usize| {
+        let near = [-reach, reach].map(|by| [by, by * width as isize]);
+        let near = near.iter().flatten();
+        near.filter_map(|by| off.get(at.checked_add_signed(*by)?))
+            .all(|other| (other - off[at]).abs() <= EVEN)
+    };
+    let outline = object.or(&enclosed(object, width));
+    let least = (object.count() as f64 * LEAST_SHADED) as u64;
+    let shaded = outline
+        .and(as_unshaded)
+        .map(|at, bit| bit && is_even(at))
+        .opened(SHADED_WIDTH)
+        .parts_where(Connectivity::Eight, |part, _| part.area >= least);
+    if shaded.count() == 0 {
+        return shaded;
+    }
+    // What is in shade in all frames is darker, and next to it.
+    let darker = outline.map(|at, bit| bit && off[at] > 0.0).minus(&shaded);
+    let deep = darker
+        .opened(1)
+        .parts_where(Connectivity::Four, |_, pixels| {
+            let part = pixels();
+            let around = part.dilated(2 * EVEN_REACH).minus(&part);
+            around.share_in(&shaded) >= NEXT_TO
+        });
+    shaded.or(&deep)
 }
 
 /// The luminance of the unshaded table in each frame.
@@ -452,6 +548,38 @@ mod tests {
         let trend = Trend::learn(&values, &samples, 10);
         assert!((trend.at(5) - gleam(5)).abs() < 0.03);
         assert!((trend.at(495) - gleam(495)).abs() < 0.03);
+    }
+
+    #[test]
+    fn an_even_part_as_bright_as_the_table_is_its_shade_and_with_it_what_is_darker_there() {
+        let square = |at: usize, from: usize, to: usize| {
+            let (x, y) = (at % 60, at / 60);
+            (from..to).contains(&x) && (from..to).contains(&y)
+        };
+        let all = Bitmap::new((60, 60), std::iter::empty());
+        let object = all.map(|at, _| square(at, 3, 57));
+        let (shade, core) = (
+            |at: usize| square(at, 6, 54),
+            |at: usize| square(at, 26, 34),
+        );
+        let off = |uneven: bool| -> Vec<f32> {
+            let level = |at: usize| match () {
+                () if core(at) => 8.0,
+                () if shade(at) && uneven => 0.4 * (at % 7) as f32,
+                () if shade(at) => 0.1,
+                () => -20.0,
+            };
+            (0..3600).map(level).collect()
+        };
+        let as_unshaded = all.map(|at, _| shade(at) && !core(at));
+        let found = shaded(&off(false), &as_unshaded, &object);
+        // Between the two a pixel may show something of both.
+        let wanted = all.map(|at, _| core(at) || square(at, 10, 20));
+        assert_eq!(wanted.minus(&found).count(), 0);
+        assert_eq!(found.minus(&all.map(|at, _| shade(at))).count(), 0);
+        assert_eq!(shaded(&off(true), &as_unshaded, &object).count(), 0);
+        let none = object.minus(&object);
+        assert_eq!(shaded(&off(false), &none, &object).count(), 0);
     }
 
     #[test]

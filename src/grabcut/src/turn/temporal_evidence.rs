@@ -95,11 +95,23 @@ impl TemporalEvidence {
     /// Whether the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
     /// next to it; `None` if the curves say nothing.
     pub(crate) fn moves(&self, part: &Bitmap, beside: &Bitmap, ground: &Bitmap) -> Option<bool> {
+        self.towards_ground(part, beside, ground)
+            .map(|towards| towards > 0.5)
+    }
+
+    /// Where the changes of `part` lie, between those of the object next to it (0) and those of what is behind it (1);
+    /// `None` if the curves say nothing.
+    pub(crate) fn towards_ground(
+        &self,
+        part: &Bitmap,
+        beside: &Bitmap,
+        ground: &Bitmap,
+    ) -> Option<f32> {
         let of_part = self.residual_of(part)?;
         let of_object = self.residual_of(beside)?;
         let of_ground = self.residual_of(ground)?;
         let says = of_ground > CLEAR * of_object;
-        says.then(|| of_part > (of_object * of_ground).sqrt())
+        says.then(|| (of_part / of_object).ln() / (of_ground / of_object).ln())
     }
 
     /// Whether two parts become brighter and darker together over the turn.
@@ -187,6 +199,8 @@ mod tests {
         let evidence = evidence(32);
         assert_eq!(evidence.moves(&third(1), &third(0), &third(2)), Some(false));
         assert_eq!(evidence.moves(&third(2), &third(0), &third(2)), Some(true));
+        let towards = evidence.towards_ground(&third(1), &third(0), &third(2));
+        assert!(towards.is_some_and(|towards| towards < 0.2), "{towards:?}");
         assert!(evidence.together(&third(0), &third(1)));
         assert!(!evidence.together(&third(0), &third(2)));
         assert_eq!(evidence.nearer(&third(1), &third(0), &third(2)), Some(true));

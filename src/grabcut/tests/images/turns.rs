@@ -1,7 +1,7 @@
 //! Masks by the turn of objects with holes, handles, dark parts and parts in shade, and what their check says.
 
 use image::{GrayImage, RgbImage};
-use relit_grabcut::{Effort, Hints, MaskCheck, TurnFrames, TurnStatistics};
+use relit_grabcut::{Effort, Hints, MaskCheck, ShapeCheck, TurnFrames, TurnStatistics};
 
 use super::turn_scene::{Difficulty, Scene, TROUBLES, scene};
 use super::{by_seeds, segment_turn};
@@ -106,6 +106,47 @@ fn the_check_sees_a_hole_in_the_object_that_the_turns_own_mask_may_have_too() {
         "{:?}",
         shape(&scene.truth)
     );
+}
+
+/// What the check says of a true mask with more pixels.
+fn shape_with(scene: &Scene, more: impl Fn(u32, u32) -> bool) -> ShapeCheck {
+    let mask = GrayImage::from_fn(scene.truth.width(), scene.truth.height(), |x, y| {
+        let is_object = scene.truth.get_pixel(x, y).0[0] > 0;
+        image::Luma([if is_object || more(x, y) { 255 } else { 0 }])
+    });
+    let turn = scene.statistics();
+    let check = MaskCheck::new(&mask, &turn).unwrap();
+    let shape = check.shape(&scene.frames[0], Effort::Fine).unwrap();
+    shape.unwrap()
+}
+
+#[test]
+fn the_check_sees_the_table_in_an_opening_that_a_mask_includes() {
+    let scene = scene(Difficulty::LowHandle, SMALL, 24, SEED);
+    let near = |at: u32, side: u32| at.saturating_sub(5)..(at + 6).min(side);
+    let found = shape_with(&scene, |x, y| {
+        let mut around = near(y, SMALL.1).flat_map(|y| near(x, SMALL.0).map(move |x| (x, y)));
+        around.any(|(x, y)| scene.critical.get_pixel(x, y).0[0] > 0)
+    });
+    assert_eq!(found.leaks.len(), 1, "{found:?}");
+    assert!(!found.faults().is_empty());
+}
+
+#[test]
+fn the_check_sees_a_thin_piece_of_the_rim_in_a_mask() {
+    let scene = scene(Difficulty::DarkPart, SMALL, 24, SEED);
+    // The rim is where the table's dark begins, at the left border.
+    let level = |y: u32| scene.frames[0].get_pixel(2, y).0[1];
+    let rim = (70..90).max_by_key(|&y| level(y - 2).saturating_sub(level(y + 2)));
+    let rim = rim.unwrap();
+    let row = |x: u32| scene.truth.get_pixel(x, rim).0[0] > 0;
+    let left = (0..SMALL.0).find(|&x| row(x)).unwrap();
+    let found = shape_with(&scene, |x, y| {
+        (rim..rim + 2).contains(&y) && (left - 20..left).contains(&x)
+    });
+    assert_eq!(found.whiskers.len(), 1, "{found:?}");
+    assert!(!found.faults().is_empty());
+    assert!(found.quick_faults().is_empty());
 }
 
 #[test]
