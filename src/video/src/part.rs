@@ -14,7 +14,7 @@ use super::{DecodeFault, Picture};
 use relit_data::geometry::Rect;
 
 /// Rows that are reported together: few enough to be in the processor's cache still.
-const BAND: u32 = 8;
+const BAND: u32 = 16;
 
 impl Video {
     /// Decodes the part of the displayed picture under `region` into `part`, which takes its size: red, green,
