@@ -113,21 +113,21 @@ impl WithSimd for HalfOfPicture<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let mut line = vec![0_u32; 2 * self.grey.width() as usize];
         for (y, columns, to) in parts(self.grey, self.rows, self.needed) {
-            let pair = 2 * columns.start..2 * columns.end;
             let row = |y: usize| {
                 let row = self.picture.row(y as i64, 0);
-                let pixels = row.get(4 * pair.start..4 * pair.end).unwrap_or_default();
-                pixels.chunks_exact(4)
+                let pixels = row.get(8 * columns.start..8 * columns.end);
+                pixels.unwrap_or_default().as_chunks::<8>().0
             };
-            let line = &mut line[..pair.len()];
-            let rows = line.iter_mut().zip(row(2 * y)).zip(row(2 * y + 1));
-            for ((sum, above), below) in rows {
-                *sum = sum_of(above) + sum_of(below);
-            }
-            for (to, pair) in to.iter_mut().zip(line.chunks_exact(2)) {
-                *to = ((pair[0] + pair[1]) >> 10) as u8;
+            for ((to, above), below) in to.iter_mut().zip(row(2 * y)).zip(row(2 * y + 1)) {
+                // Every other byte of two pixels, with room for the sums.
+                let [above, below] = [above, below].map(|two| u64::from_le_bytes(*two));
+                let every_other = |two: u64| two & 0x00ff_00ff_00ff_00ff;
+                let red_blue = every_other(above) + every_other(below);
+                let green = every_other(above >> 8) + every_other(below >> 8);
+                let [red_blue, green] = [red_blue, green].map(|two| (two + (two >> 32)) as u32);
+                let [red, green, blue] = [red_blue & 0xffff, green & 0xffff, red_blue >> 16];
+                *to = (weighed([red, green, blue]) >> 10) as u8;
             }
         }
     }
@@ -137,7 +137,12 @@ impl WithSimd for HalfOfPicture<'_> {
 #[inline(always)]
 fn sum_of(pixel: &[u8]) -> u32 {
     let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
-    77 * (all & 255) + 150 * ((all >> 8) & 255) + 29 * ((all >> 16) & 255)
+    weighed([all & 255, (all >> 8) & 255, (all >> 16) & 255])
+}
+
+#[inline(always)]
+fn weighed([red, green, blue]: [u32; 3]) -> u32 {
+    77 * red + 150 * green + 29 * blue
 }
 
 struct HalfOfGrey<'a> {
@@ -183,6 +188,32 @@ mod tests {
     fn half_a_picture_has_the_means_and_an_odd_edge_is_left_out() {
         let image = GrayImage::from_raw(3, 2, vec![0, 4, 9, 8, 12, 9]).unwrap();
         assert_eq!(halved(&image, &Region::whole((1, 1))).as_raw(), &[6]);
+    }
+
+    #[test]
+    fn half_a_picture_has_the_mean_brightness_of_four_pixels() {
+        let picture = RgbaImage::from_fn(22, 10, |x, y| {
+            let value = |by: u32| {
+                if (x + y) % 5 == 0 {
+                    255
+                } else {
+                    (by * (x + 23 * y)) as u8
+                }
+            };
+            Rgba([value(37), value(91), value(53), value(7)])
+        });
+        let mut half = GrayImage::default();
+        half_luma(
+            CropView::whole(&picture),
+            0..10,
+            &Region::whole((11, 5)),
+            &mut half,
+        );
+        for (x, y, found) in half.enumerate_pixels() {
+            let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
+            let four = four.map(|(dx, dy)| sum_of(&picture.get_pixel(2 * x + dx, 2 * y + dy).0));
+            assert_eq!(u32::from(found.0[0]), four.iter().sum::<u32>() >> 10);
+        }
     }
 
     #[test]

@@ -53,9 +53,6 @@ pub(super) struct Similarity {
 const TERMS: usize = 8;
 /// The first of the right side.
 const RIGHT: usize = 3;
-/// Pixels that lie together, whose errors are taken for one: light that passes pulls at all of them.
-const PIECE: usize = 128;
-
 /// The normal equations of one step, and what goes with them.
 #[derive(Default)]
 struct Sums {
@@ -117,6 +114,20 @@ impl Template {
             }
         }
         best.1
+    }
+
+    /// The part of the object that agrees with the frame, by what its pixels say about a shift, 0..=1.
+    pub(super) fn agreement(&self, frame: &Gradients, shift: [f64; 2]) -> f64 {
+        let sampler = Sampler::new(frame, shift);
+        let [mut agrees, mut all] = [0.0; 2];
+        for pixel in &self.pixels {
+            let weight = sampler
+                .at(pixel)
+                .map_or(0.0, |found| weighed(pixel, found, OUTLIER).0);
+            agrees += f64::from(weight);
+            all += f64::from(pixel.weight);
+        }
+        agrees / all
     }
 
     /// What a rotation and a growth about the object's centre explain beyond the shift.
@@ -181,7 +192,7 @@ impl WithSimd for Summing<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Sums {
         let mut sums = Sums::default();
         // Within a piece, single precision suffices.
-        for pixels in self.template.pixels.chunks(PIECE) {
+        for pixels in self.template.pixels.chunks(self.template.piece) {
             let mut piece = [0.0_f32; TERMS];
             for pixel in pixels {
                 if let Some(found) = self.sampler.at(pixel) {

@@ -10,6 +10,7 @@
 mod brightness;
 mod fit;
 mod median;
+mod patches;
 mod region;
 mod required_regions;
 mod structure;
@@ -24,6 +25,7 @@ use relit_data::statistics::upper_median;
 use super::CropView;
 use brightness::{half, half_luma, luma};
 use fit::Fit;
+use patches::{PatchBuffers, Patches};
 use region::Region;
 use required_regions::RequiredRegions;
 use structure::{Extractor, Gradients, Plane};
@@ -112,6 +114,8 @@ pub struct Alignment {
 pub struct Aligner {
     /// From the finest to the coarsest.
     templates: Vec<Template>,
+    /// Of the finest template, if there are coarser ones.
+    patches: Option<Patches>,
     /// Largest shift that is looked for, pixels of the finest template.
     reach: f64,
     /// Pixels of a frame in one of the finest template.
@@ -146,6 +150,7 @@ pub struct AlignBuffers {
 struct GradientBuffers {
     extractor: Extractor,
     scales: Vec<Gradients>,
+    patches: PatchBuffers,
 }
 
 impl Aligner {
@@ -214,23 +219,29 @@ impl Aligner {
                 halvings,
                 coarsest,
             ),
+            patches: finest_patches(&templates),
             templates,
             reach,
             unit,
             min_confidence: MIN_CONFIDENCE,
             motion: Motion::default(),
         };
-        let found: Vec<Alignment> = samples
+        let (found, agreements): (Vec<Alignment>, Vec<Option<f64>>) = samples
             .par_iter()
             .map_init(AlignBuffers::default, |buffers, sample| {
-                aligner.measure(sample, buffers)
+                let AlignBuffers { lumas, gradients } = buffers;
+                let lumas = aligner.required_regions.lumas_of_sample(&sample.0, lumas);
+                aligner.located(lumas, gradients)
             })
-            .collect();
+            .unzip();
         let usable = found.get(reference)?.shift.is_some();
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = upper_median(registered.map(|found| found.confidence)).unwrap_or_default();
         aligner.min_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
         aligner.motion = Motion::from_alignments(&found, reference);
+        if let Some(patches) = &mut aligner.patches {
+            patches.expect(agreements.into_iter().flatten());
+        }
         usable.then_some(aligner)
     }
 
@@ -244,7 +255,7 @@ impl Aligner {
         let lumas = self
             .required_regions
             .lumas_of_sample(&frame.0, &mut buffers.lumas);
-        self.located(lumas, &mut buffers.gradients)
+        self.located(lumas, &mut buffers.gradients).0
     }
 
     /// Looks at these rows of a frame's crop, which has the size of the mask; they come from the top to the bottom.
@@ -257,74 +268,89 @@ impl Aligner {
     /// Where the object is in a frame, all rows of its crop being known.
     pub fn measure_rows(&self, buffers: &mut AlignBuffers) -> Alignment {
         let lumas = self.required_regions.lumas_of_rows(&mut buffers.lumas);
-        self.located(lumas, &mut buffers.gradients)
+        self.located(lumas, &mut buffers.gradients).0
     }
 
-    fn located(&self, lumas: &[GrayImage], buffers: &mut GradientBuffers) -> Alignment {
-        let gradients = self.gradients(lumas, buffers);
-        let sure = |fit: &Fit| fit.correlation >= self.min_confidence;
-        let coarsest = self.templates.len() - 1;
-        let reach = self.reach / (1_u32 << coarsest) as f64;
-        let start = self.templates[coarsest].search(&gradients[coarsest], reach);
-        let fit = self.refine(gradients, start);
+    /// Where the object is, and the part of the patches that agrees if they told it.
+    fn located(
+        &self,
+        lumas: &[GrayImage],
+        buffers: &mut GradientBuffers,
+    ) -> (Alignment, Option<f64>) {
+        let (fit, agreement) = self.refined(lumas, buffers).unzip();
         let confidence = fit.map_or(0.0, |fit| fit.correlation.clamp(0.0, 1.0));
-        let fit = fit.filter(sure);
+        let fit = fit.filter(|fit| self.is_sure(fit));
         let in_pixels = |length: f64| self.unit * length;
         let uncertainty = fit.map_or(f64::INFINITY, |fit| in_pixels(fit.uncertainty));
         let shift = fit.map(|fit| fit.shift.map(in_pixels));
-        Alignment {
+        let alignment = Alignment {
             shift: shift.map(|shift| self.motion.against_mask(shift, uncertainty)),
             uncertainty,
             confidence,
-            turned: fit.and_then(|fit| self.turned(gradients, fit)),
-        }
+            turned: fit.and_then(|fit| self.turned(&buffers.scales, fit)),
+        };
+        (alignment, agreement.flatten())
     }
 
-    /// A frame's gradients at all scales, where they are needed.
-    fn gradients<'b>(
+    fn is_sure(&self, fit: &Fit) -> bool {
+        fit.correlation >= self.min_confidence
+    }
+
+    /// From the coarsest scale to the finest.
+    fn refined(
         &self,
         lumas: &[GrayImage],
-        buffers: &'b mut GradientBuffers,
-    ) -> &'b [Gradients] {
-        let GradientBuffers { extractor, scales } = buffers;
+        buffers: &mut GradientBuffers,
+    ) -> Option<(Fit, Option<f64>)> {
+        let GradientBuffers {
+            extractor,
+            scales,
+            patches,
+        } = buffers;
         scales.resize_with(self.templates.len(), Gradients::default);
-        for ((luma, needs), gradients) in lumas
-            .iter()
-            .zip(&self.required_regions.needs)
-            .zip(&mut *scales)
-        {
-            extractor.gradients(luma, needs, gradients);
-        }
-        scales
-    }
-
-    /// From the coarsest scale to the finest; `start` is in the coarsest's pixels.
-    fn refine(&self, gradients: &[Gradients], start: [f64; 2]) -> Option<Fit> {
-        let mut start = start;
-        let mut found = None;
+        let coarsest = self.templates.len() - 1;
+        let mut start = [0.0; 2];
+        let mut found: Option<(Fit, Option<f64>)> = None;
         let mut apart = 0.0;
         for (scale, template) in self.templates.iter().enumerate().rev() {
             let pixels = f64::from(1_u32 << scale);
-            let reach = self.reach / pixels;
-            let fit = template.fit(gradients.get(scale)?, start, reach, still(scale));
+            let (reach, still) = (self.reach / pixels, still(scale));
+            let luma = lumas.get(scale)?;
+            // Without a place at a coarser scale, nothing tells where the patches are.
+            let by_patches = self
+                .patches
+                .as_ref()
+                .filter(|_| scale == 0 && found.is_some());
+            let by_patches = by_patches
+                .and_then(|by| by.fit(luma, start, still, extractor, patches))
+                .filter(|(fit, _)| self.is_sure(fit));
+            found = match by_patches {
+                Some((fit, agreement)) => Some((fit, Some(agreement))),
+                None => {
+                    let gradients = scales.get_mut(scale)?;
+                    extractor.gradients(luma, self.required_regions.needs.get(scale)?, gradients);
+                    if scale == coarsest {
+                        start = template.search(gradients, reach);
+                    }
+                    let fit = template.fit(gradients, start, reach, still);
+                    fit.map(|fit| (fit, None))
+                }
+            };
             // A scale at which the object has no structure says nothing.
-            if let Some(fit) = fit {
+            if let Some((fit, _)) = found {
                 let [dx, dy] = [fit.shift[0] - start[0], fit.shift[1] - start[1]];
-                let has_coarser = scale + 1 < self.templates.len();
-                if has_coarser && scale < COMPARED {
+                if scale < coarsest && scale < COMPARED {
                     apart += pixels * pixels * (dx * dx + dy * dy);
                 }
                 start = fit.shift;
             }
-            found = fit;
             if scale > 0 {
                 start = start.map(|part| 2.0 * part);
             }
         }
-        found.map(|fit| Fit {
-            uncertainty: (fit.uncertainty * fit.uncertainty + apart).sqrt(),
-            ..fit
-        })
+        let (fit, agreement) = found?;
+        let uncertainty = (fit.uncertainty * fit.uncertainty + apart).sqrt();
+        Some((Fit { uncertainty, ..fit }, agreement))
     }
 
     fn turned(&self, gradients: &[Gradients], fit: Fit) -> Option<(f64, f64)> {
@@ -390,6 +416,14 @@ impl Motion {
         }
         let part = (variance / uncertainty.powi(2)).min(1.0);
         [0, 1].map(|axis| self.centre[axis] + part * away[axis])
+    }
+}
+
+/// The patches of the finest template, if there are coarser ones.
+fn finest_patches(templates: &[Template]) -> Option<Patches> {
+    match templates {
+        [finest, _, ..] => Patches::from_template(finest),
+        _ => None,
     }
 }
 

@@ -16,11 +16,13 @@ const DARK: f32 = 8.0;
 /// Standard deviations of the two Gaussians of the band-pass, pixels.
 const FINE: f32 = 0.5;
 const COARSE: f32 = 1.2;
-/// Values of the finer one, and of the one that makes the coarser of it: up to three deviations.
-const FINE_TAPS: usize = 5;
-const REST_TAPS: usize = 9;
+/// Values of the finer one, and of the one that makes the coarser of it: up to two deviations or more.
+const FINE_TAPS: usize = 3;
+const REST_TAPS: usize = 7;
 const FINE_RADIUS: usize = FINE_TAPS / 2;
 const REST_RADIUS: usize = REST_TAPS / 2;
+/// Pixels around a place that are looked at to know its gradient.
+pub(super) const AROUND: usize = 1 + REST_RADIUS + FINE_RADIUS;
 /// Columns that a row has on both sides of the picture's, to be filtered.
 const MARGIN: usize = REST_RADIUS;
 

@@ -13,8 +13,10 @@ use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
 const MAX_PIXELS: usize = 4_000;
+/// Pixels whose errors are taken for one.
+const PIECE: usize = 128;
 /// Side of the squares in whose order the pixels stand, so that neighbours are near each other.
-const TILE: u32 = 24;
+pub(super) const TILE: u32 = 24;
 /// Rows of a template that a thread makes at a time.
 const BAND: usize = 16;
 /// Deviation of the gradients by noise.
@@ -38,8 +40,11 @@ pub(super) struct TemplatePixel {
 /// The object's lasting structure.
 #[derive(Debug, Default)]
 pub(super) struct Template {
-    /// In an order in which neighbours are near each other.
+    /// Tile by tile.
     pub(super) pixels: Vec<TemplatePixel>,
+    /// As many that follow each other lie together, and their errors are taken for one: light that passes pulls at all of
+    /// them.
+    pub(super) piece: usize,
 }
 
 /// Median and deviation of the gradients of one row.
@@ -69,10 +74,11 @@ impl Template {
                 pixels.push(pixel(&rows, x, y));
             }
         }
-        keep_most_telling(&mut pixels);
-        let tile = |pixel: &TemplatePixel| (pixel.y / TILE, pixel.x / TILE, pixel.y, pixel.x);
-        pixels.sort_unstable_by_key(tile);
-        Self { pixels }
+        keep_most_telling(&mut pixels, MAX_PIXELS);
+        Self {
+            pixels,
+            piece: PIECE,
+        }
     }
 }
 
@@ -98,21 +104,23 @@ fn pixel(rows: &[TemplateRow], x: usize, y: usize) -> TemplatePixel {
 }
 
 /// What a pixel says about a shift.
-fn information(pixel: &TemplatePixel) -> f32 {
+pub(super) fn information(pixel: &TemplatePixel) -> f32 {
     let [xx, xy, yy] = pixel.change;
     pixel.weight * (xx * xx + 2.0 * xy * xy + yy * yy)
 }
 
-fn keep_most_telling(pixels: &mut Vec<TemplatePixel>) {
-    if pixels.len() <= MAX_PIXELS {
-        return;
+/// Keeps at most so many, in an order in which neighbours are near each other.
+pub(super) fn keep_most_telling(pixels: &mut Vec<TemplatePixel>, most: usize) {
+    if pixels.len() > most {
+        pixels.select_nth_unstable_by(most, |a, b| {
+            information(b)
+                .total_cmp(&information(a))
+                .then((a.y, a.x).cmp(&(b.y, b.x)))
+        });
+        pixels.truncate(most);
     }
-    pixels.select_nth_unstable_by(MAX_PIXELS, |a, b| {
-        information(b)
-            .total_cmp(&information(a))
-            .then((a.y, a.x).cmp(&(b.y, b.x)))
-    });
-    pixels.truncate(MAX_PIXELS);
+    let tile = |pixel: &TemplatePixel| (pixel.y / TILE, pixel.x / TILE, pixel.y, pixel.x);
+    pixels.sort_unstable_by_key(tile);
 }
 
 /// Rows that are made together: of those above and below, which both need, few are made twice.

@@ -74,6 +74,30 @@ fn shifts_are_found_to_a_tenth_of_a_pixel_while_light_and_highlight_move() {
 }
 
 #[test]
+fn patches_tell_the_shift_of_the_whole_object() {
+    let shift = |at: usize| [0.1 * at as f64, 0.3 * (at as f64).sin()];
+    let (by_patches, mut whole) = (learnt(shift), learnt(shift));
+    assert!(whole.patches.take().is_some());
+    for (shift, at) in [([0.4, -0.7], 5), ([2.3, 1.1], 11), ([-6.2, 4.9], 17)] {
+        let frame = frame(shift, angle(at, 20));
+        let [found, wanted] = [&by_patches, &whole].map(|by| measured(by, &frame).shift.unwrap());
+        let apart = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
+        assert!(apart > 0.0 && apart < 0.06, "{apart}");
+    }
+}
+
+#[test]
+fn patches_that_agree_less_than_usual_are_not_believed() {
+    let [mut doubtful, mut whole] = [0, 1].map(|_| learnt(|_| [0.0; 2]));
+    whole.patches = None;
+    doubtful.patches.as_mut().unwrap().expect([2.0].into_iter());
+    for (shift, at) in [([0.4, -0.7], 5), ([2.3, 1.1], 11)] {
+        let frame = frame(shift, angle(at, 20));
+        assert_eq!(measured(&doubtful, &frame), measured(&whole, &frame));
+    }
+}
+
+#[test]
 fn a_turn_that_stands_still_stays_where_it_is() {
     let aligner = learnt(|_| [0.0; 2]);
     for at in 0..15 {

@@ -33,11 +33,6 @@ pub(super) struct SourceMask {
 
 impl SourceMask {
     pub(super) fn new(image: GrayImage) -> Self {
-        let hull = |row: &[u8]| {
-            let start = row.iter().position(|&m| m != 0).unwrap_or_default();
-            let end = row.iter().rposition(|&m| m != 0);
-            start..end.map_or(start, |last| last + 1)
-        };
         let width = image.width().max(1) as usize;
         let rows = || image.as_raw().chunks_exact(width);
         Self {
@@ -46,6 +41,13 @@ impl SourceMask {
             image,
         }
     }
+}
+
+/// The columns of a mask's row from the first that is not 0 to the last.
+fn hull(row: &[u8]) -> Range<usize> {
+    let start = row.iter().position(|&m| m != 0).unwrap_or_default();
+    let end = row.iter().rposition(|&m| m != 0);
+    start..end.map_or(start, |last| last + 1)
 }
 
 /// The runs of a mask's row that are not 0.
@@ -68,9 +70,11 @@ pub struct ScaleBuffers {
     light: [Vec<f32>; PLANES],
     /// Output rows before they are filtered across; each is used again for later ones.
     sums: Vec<[Vec<f32>; PLANES]>,
-    /// An output row's light, and its levels, channel by channel.
-    across: Vec<f32>,
-    levels: Vec<u16>,
+    /// An output row before it is filtered across, its planes side by side.
+    line: Vec<[f32; PLANES]>,
+    /// Its light afterwards, and the levels of that.
+    across: Vec<[f32; PLANES]>,
+    levels: Vec<[u16; PLANES]>,
 }
 
 /// The gathering of one crop's pixels.
@@ -123,7 +127,7 @@ impl Gather<'_> {
         buffers.reset(
             source + self.across.taps(),
             self.down.overlap().max(1),
-            3 * self.mask.width() as usize,
+            self.mask.width() as usize,
         );
         Progress {
             scaled: RgbImage::new(self.mask.width(), self.mask.height()),
@@ -259,6 +263,7 @@ impl Gather<'_> {
     fn finish(&self, output: usize, buffers: &mut ScaleBuffers, scaled: &mut RgbImage) {
         let ScaleBuffers {
             sums,
+            line,
             across,
             levels,
             ..
@@ -267,38 +272,54 @@ impl Gather<'_> {
         let width = self.mask.width() as usize;
         let row = output * width..(output + 1) * width;
         let mask = self.mask.as_raw().get(row.clone()).unwrap_or_default();
-        let [red, green, blue, shares] = sums;
-        for (x, pixel) in across.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        let columns = hull(mask);
+        let Some(last) = columns.clone().last() else {
+            return;
+        };
+        let window = |x: usize| {
+            let (start, weights) = self.across.window(x);
+            (start..start + weights.len(), weights)
+        };
+        let needed = window(columns.start).0.start..window(last).0.end;
+        side_by_side(sums, needed, line);
+        for x in columns.clone() {
             if mask[x] == 0 {
-                *pixel = [0.0; 3];
+                across[x] = [0.0; PLANES];
                 continue;
             }
-            let (start, weights) = self.across.window(x);
-            let filtered = |plane: &[f32]| dot(weights, &plane[start..start + weights.len()]);
+            let (window, weights) = window(x);
+            let filtered = weighed_sum(weights, &line[window]);
             let gain = match self.gain {
                 Some(gain) => gain[row.start + x],
                 // Where nothing of the moved object is left, the pixel stays 0.
-                None => 1.0 / filtered(shares).max(1e-5),
+                None => 1.0 / filtered[PLANES - 1].max(1e-5),
             };
-            for (light, channel) in pixel.iter_mut().zip([red, green, blue]) {
-                *light = gain * filtered(channel);
-            }
+            across[x] = filtered.map(|light| gain * light);
         }
         // In loops of their own: the first of them becomes vector instructions, the second waits for the table only.
-        for (level, light) in levels.iter_mut().zip(&*across) {
+        let (across, levels) = (&across[columns.clone()], &mut levels[columns.clone()]);
+        for (level, light) in levels
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(across.as_flattened())
+        {
             *level = Srgb::level(*light);
         }
-        let values = scaled.get_mut(3 * row.start..3 * row.end);
-        for (value, level) in values.unwrap_or_default().iter_mut().zip(&*levels) {
-            *value = self.srgb.value(*level);
+        let values = 3 * (row.start + columns.start)..3 * (row.start + columns.end);
+        let values = scaled.get_mut(values).unwrap_or_default();
+        for (pixel, levels) in values.as_chunks_mut::<3>().0.iter_mut().zip(levels) {
+            for (value, level) in pixel.iter_mut().zip(levels) {
+                *value = self.srgb.value(*level);
+            }
         }
     }
 }
 
 impl ScaleBuffers {
-    fn reset(&mut self, length: usize, ring: usize, values: usize) {
-        self.across.resize(values, 0.0);
-        self.levels.resize(values, 0);
+    fn reset(&mut self, length: usize, ring: usize, outputs: usize) {
+        self.line.resize(length, [0.0; PLANES]);
+        self.across.resize(outputs, [0.0; PLANES]);
+        self.levels.resize(outputs, [0; PLANES]);
         let all = self.sums.iter_mut().flatten().chain(&mut self.light);
         for plane in all.filter(|plane| plane.len() != length) {
             plane.clear();
@@ -376,16 +397,34 @@ fn add_scaled(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// The sum of products; the lengths are a multiple of four.
+/// Puts these columns of planes side by side.
 #[inline(always)]
-fn dot(weights: &[f32], values: &[f32]) -> f32 {
-    let mut lanes = [0.0; 4];
-    for (weights, values) in weights.chunks_exact(4).zip(values.chunks_exact(4)) {
-        for ((lane, weight), value) in lanes.iter_mut().zip(weights).zip(values) {
-            *lane += weight * value;
+fn side_by_side(planes: &[Vec<f32>; PLANES], columns: Range<usize>, line: &mut [[f32; PLANES]]) {
+    let [red, green, blue, shares] = planes.each_ref().map(|plane| &plane[columns.clone()]);
+    let colours = red.iter().zip(green).zip(blue).zip(shares);
+    for (to, (((red, green), blue), share)) in line[columns].iter_mut().zip(colours) {
+        *to = [*red, *green, *blue, *share];
+    }
+}
+
+/// The sum of pixels times their weights, whose number is a multiple of four.
+#[inline(always)]
+fn weighed_sum(weights: &[f32], pixels: &[[f32; PLANES]]) -> [f32; PLANES] {
+    let mut lanes = [[0.0; PLANES]; 4];
+    let fours = weights
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .zip(pixels.as_chunks::<4>().0);
+    for (weights, pixels) in fours {
+        for ((lane, weight), pixel) in lanes.iter_mut().zip(weights).zip(pixels) {
+            for (sum, value) in lane.iter_mut().zip(pixel) {
+                *sum += weight * value;
+            }
         }
     }
-    (lanes[0] + lanes[2]) + (lanes[1] + lanes[3])
+    let [a, b, c, d] = lanes;
+    std::array::from_fn(|plane| (a[plane] + c[plane]) + (b[plane] + d[plane]))
 }
 
 #[cfg(test)]
