@@ -3,7 +3,8 @@
 //! A rig's belt vibrates and its table sags: the object moves by a fraction of a pixel or a few. The light
 //! moves far more, so frames are not compared with each other. A template of what lasts (`template`) is made of
 //! frames spread over the turn, and each frame is fitted to it on its own (`fit`), from a coarse scale to a
-//! fine one (`structure`): the result does not depend on other frames, nor on the number of threads.
+//! fine one (`structure`), and there by a few patches where these can be believed (`patches`): the result does not
+//! depend on other frames, nor on the number of threads.
 //!
 //! This module knows pictures and a mask, and nothing of files, videos or shards.
 
