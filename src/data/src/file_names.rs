@@ -98,23 +98,14 @@ pub fn name_differing_in_case(path: &Path) -> io::Result<Option<OsString>> {
         }
         entries => entries?,
     };
+    let wanted = folded(&name.to_string_lossy());
     for entry in entries {
         let found = entry?.file_name();
-        if found != name && are_alike(&found.to_string_lossy(), &name.to_string_lossy()) {
+        if found != name && folded(&found.to_string_lossy()) == wanted {
             return Ok(Some(found));
         }
     }
     Ok(None)
-}
-
-/// Whether two names are folded to the same; a folder has many names, and most are plain.
-#[cfg(feature = "files")]
-fn are_alike(one: &str, other: &str) -> bool {
-    if !one.is_ascii() || !other.is_ascii() {
-        return folded(one) == folded(other);
-    }
-    let kept = |name: &str| name.trim_end_matches(['.', ' ']).len();
-    one[..kept(one)].eq_ignore_ascii_case(&other[..kept(other)])
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use image::{GrayImage, RgbImage};
+use image::{GrayImage, Luma, RgbImage};
 
 /// The 8-bit value from which a channel counts as saturated, where nobody asks for another.
 ///
@@ -69,7 +69,8 @@ pub fn fraction(part: u64, whole: u64) -> f64 {
 
 /// Measures all pixels of `image`; `level` is the saturation level, 0..=255.
 pub fn measure_whole(image: &RgbImage, level: u8) -> Measures {
-    MaskSpans::whole(image.width(), image.height()).sum(image, level)
+    let whole = GrayImage::from_pixel(image.width(), image.height(), Luma([255]));
+    MaskSpans::from_mask(&whole).sum(image, level)
 }
 
 /// Part of a row: columns.
@@ -88,20 +89,6 @@ pub struct MaskSpans {
 }
 
 impl MaskSpans {
-    /// All pixels of an image of this size.
-    fn whole(width: u32, height: u32) -> Self {
-        let (w, h) = (width as usize, height as usize);
-        let is_inner = |y: usize| w > 2 && y > 0 && y + 1 < h;
-        let inner = |y| is_inner(y).then_some(1..w - 1);
-        Self {
-            width,
-            height,
-            rows: vec![std::iter::once(0..w).collect(); h],
-            inner: (0..h).map(|y| inner(y).into_iter().collect()).collect(),
-            pixels: u64::from(width) * u64::from(height),
-        }
-    }
-
     /// The runs of `mask`, in which values of 128 and above are the object.
     pub fn from_mask(mask: &GrayImage) -> Self {
         let (width, height) = mask.dimensions();
@@ -454,7 +441,7 @@ impl Laplacian {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{Luma, Rgb};
+    use image::Rgb;
     use proptest::prelude::*;
 
     /// The definition, pixel by pixel.

@@ -8,6 +8,7 @@ use super::{
     FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, SessionError, Status,
     is_session_name, object_of,
 };
+use crate::counts::count_of;
 use crate::file_names::{composed, is_hidden, is_video};
 
 /// The longest name of a recording that is made from a file name, bytes.
@@ -351,9 +352,8 @@ fn read_index(
     }
     for gap in index.gaps() {
         notices.push(Notice::Loss(format!(
-            "the camera dropped {} frame{} before frame {}",
-            gap.missing,
-            if gap.missing == 1 { "" } else { "s" },
+            "the camera dropped {} before frame {}",
+            count_of(gap.missing, "frame"),
             gap.before
         )));
     }

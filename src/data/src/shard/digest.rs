@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -125,16 +125,8 @@ impl<W: Write> Write for Hashing<W> {
 impl<R: Read> Hashing<R> {
     /// Reads to the end and returns the number of bytes read.
     pub(super) fn drain(&mut self) -> io::Result<u64> {
-        let before = self.bytes;
-        let mut buffer = vec![0; 1 << 17];
-        loop {
-            match self.read(&mut buffer) {
-                Ok(0) => return Ok(self.bytes - before),
-                Ok(_) => {}
-                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
+        let mut rest = BufReader::with_capacity(1 << 17, self);
+        io::copy(&mut rest, &mut io::sink())
     }
 }
 

@@ -24,7 +24,10 @@ pub struct FileEntry {
 impl FileEntry {
     /// Checks that the file exists in the data set `out` and has this length and digest.
     pub(super) fn check(&self, out: &Path) -> Result<(), ShardError> {
-        check_file(out, &self.file, (self.bytes, self.blake3))
+        names::check_path(&self.file)?;
+        let path = out.join(&self.file);
+        let found = Digest::hash_file(&path).map_err(ShardError::io("read", &path))?;
+        compare(&self.file, (self.bytes, self.blake3), found)
     }
 }
 
@@ -37,13 +40,6 @@ impl From<&ShardEntry> for FileEntry {
             blake3: shard.blake3,
         }
     }
-}
-
-fn check_file(out: &Path, file: &str, expected: (u64, Digest)) -> Result<(), ShardError> {
-    names::check_path(file)?;
-    let path = out.join(file);
-    let found = Digest::hash_file(&path).map_err(ShardError::io("read", &path))?;
-    compare(file, expected, found)
 }
 
 /// Compares the expected length and digest of `file` with those that were found.
@@ -99,9 +95,8 @@ fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), Sha
     for entry in shard.mask.iter().chain(&shard.mean_img) {
         entry.check(out)?;
     }
-    let expected = (shard.bytes, shard.blake3);
     if layout == Layout::Webdataset {
-        return check_file(out, &shard.file, expected);
+        return FileEntry::from(shard).check(out);
     }
     names::check_path(&shard.file)?;
     let mut images = FolderImages::default();

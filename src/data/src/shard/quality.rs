@@ -239,7 +239,6 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (number > 0).then(|| sum / f64::from(number))
 }
 
-/// The upper median; 0 of nothing.
 /// To a `steps`th.
 fn rounded(value: f64, steps: f64) -> f64 {
     (value * steps).round() / steps

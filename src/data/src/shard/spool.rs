@@ -1,7 +1,7 @@
 //! The layout `webdataset`: images are collected in a spool file and then written to the tar in the
 //! shard's order.
 
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use super::names::{self, Part};
@@ -43,10 +43,9 @@ impl SpoolStore {
             offset: self.bytes,
             bytes: png.len() as u64,
         };
-        let file = &mut self.scratch.file;
         // A failed push may have left bytes behind: each image is written at its own offset.
-        file.seek(SeekFrom::Start(extent.offset))
-            .and_then(|_| file.write_all(png))
+        let file = &self.scratch.file;
+        file.write_all_at(png, extent.offset)
             .map_err(ShardError::io("write", &self.scratch.path))?;
         self.bytes += extent.bytes;
         if let Some(slot) = self.extents.get_mut(index as usize) {
@@ -106,16 +105,9 @@ impl SpoolStore {
     }
 
     fn read(&self, extent: Extent, png: &mut Vec<u8>) -> Result<(), ShardError> {
-        png.clear();
-        let mut file = &self.scratch.file;
-        file.seek(SeekFrom::Start(extent.offset))
-            .and_then(|_| file.take(extent.bytes).read_to_end(png))
-            .and_then(|read| {
-                let complete = read as u64 == extent.bytes;
-                complete
-                    .then_some(())
-                    .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
-            })
+        png.resize(extent.bytes as usize, 0);
+        let file = &self.scratch.file;
+        file.read_exact_at(png, extent.offset)
             .map_err(ShardError::io("read back", &self.scratch.path))
     }
 }

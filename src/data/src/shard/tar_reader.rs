@@ -320,11 +320,7 @@ impl Extensions {
 
     fn add(&mut self, kind: EntryType, data: &[u8]) {
         if kind == EntryType::GNULongName {
-            let end = data
-                .iter()
-                .position(|&byte| byte == 0)
-                .unwrap_or(data.len());
-            self.path = data.get(..end).map(<[u8]>::to_vec);
+            self.path = data.split(|&byte| byte == 0).next().map(<[u8]>::to_vec);
             return;
         }
         for (key, value) in pax_records(data) {
@@ -359,13 +355,9 @@ fn valid_header(block: &Block) -> Option<&Header> {
         return None;
     }
     let header = Header::from_byte_slice(block);
-    let checksum = 148..156;
-    let sum: u32 = block
-        .iter()
-        .enumerate()
-        .map(|(at, &byte)| u32::from(if checksum.contains(&at) { b' ' } else { byte }))
-        .sum();
-    (header.cksum().ok()? == sum).then_some(header)
+    let mut summed = header.clone();
+    summed.set_cksum();
+    (header.cksum().ok()? == summed.cksum().ok()?).then_some(header)
 }
 
 fn is_zero(bytes: &[u8]) -> bool {

@@ -1,6 +1,9 @@
 //! The format of a file, by its content.
 
+use std::path::Path;
+
 use super::tiff;
+use crate::file_names::has_extension;
 
 /// A format of still images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +40,11 @@ pub const ENDINGS: [&str; 18] = [
     "png", "jpg", "jpeg", "jpe", "jfif", "jif", "jfi", "webp", "tif", "tiff", "bmp", "dib", "gif",
     "exr", "hdr", "rgbe", "xyze", "pic",
 ];
+
+/// Whether a file is called as a picture that is read.
+pub fn is_named(path: &Path) -> bool {
+    has_extension(path, &ENDINGS)
+}
 
 impl Format {
     /// A camera's raw file.
@@ -182,6 +190,16 @@ fn of_markup(bytes: &[u8]) -> Option<Format> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn endings_are_known_in_any_case() {
+        for name in ["a.JPG", "a.jfif", "b.jpe", "c.Tiff", "d.HDR"] {
+            assert!(is_named(Path::new(name)), "{name}");
+        }
+        for name in ["a.heic", "jpg", "a.png.txt", ""] {
+            assert!(!is_named(Path::new(name)), "{name}");
+        }
+    }
 
     #[test]
     fn a_format_is_known_by_its_content() {
