@@ -114,7 +114,22 @@ fn room_check(rig: &mut Rehearsal) -> (bool, String) {
 
 #[test]
 fn a_take_keeps_what_its_camera_may_have_changed_by_itself() {
-    let mut rig = Rehearsal::short("", |_| {});
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["session.json", "frames.jsonl", "video.mkv"] {
+        std::fs::copy(fixture(SHORT).join(name), folder.path().join(name)).unwrap();
+    }
+    let path = folder.path().join("session.json");
+    let held = std::fs::read_to_string(&path).unwrap();
+    let automatic = held.replace(
+        "\"white_balance_automatic\": false",
+        "\"white_balance_automatic\": true",
+    );
+    assert_ne!(held, automatic);
+    std::fs::write(&path, automatic).unwrap();
+    let recorded = folder.path().to_str().unwrap();
+    let mut rig = Rehearsal::with(recorded, "", "sim:?speed=0", |settings| {
+        settings.degrees_per_second = 36.0;
+    });
     let take = rig.capture().unwrap();
     let checks = rig.monitor.state().checks;
     let of_camera = |check: &&Check| check.what == "camera settings" && !check.good;
