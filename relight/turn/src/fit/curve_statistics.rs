@@ -17,7 +17,7 @@ const MEAN_WEIGHT: f64 = 0.1;
 const VARIATION_FLOOR: f64 = 0.01;
 
 /// The normal equations of a pixel: with weights w, harmonics b and values v, the sums of w b v, of w b b and of
-/// w v v for each channel, where the mean of the curve counts by `mean_weight`.
+/// w v v for each channel, where the mean of the curve counts by [`MEAN_WEIGHT`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CurveStatistics {
     right: [[f64; COEFFICIENTS]; 3],
@@ -31,19 +31,6 @@ pub(crate) struct CurveStatistics {
 const fn pair(i: usize, j: usize) -> usize {
     let (low, high) = if i < j { (i, j) } else { (j, i) };
     high * (high + 1) / 2 + low
-}
-
-/// The factors of each pair in the product of two lists of harmonics.
-fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
-    let mut at = 0;
-    for j in 0..a.len() {
-        for i in 0..j {
-            products[at] = a[i] * b[j] + a[j] * b[i];
-            at += 1;
-        }
-        products[at] = a[j] * b[j];
-        at += 1;
-    }
 }
 
 /// A linear problem for a small rotation of a pixel's normal: sums over all channels, over the energy of the curve's variation.
@@ -92,7 +79,7 @@ impl CurveStatistics {
         }
     }
 
-    /// The moments with the mean's smaller share.
+    /// The sums with the mean's smaller share.
     fn mixed(mut self) -> Self {
         let mut variation = 0.0;
         for channel in 0..3 {
@@ -206,10 +193,8 @@ impl CurveStatistics {
 
     /// The residual energy of such Fourier coefficients.
     pub(crate) fn residual_energy(&self, channel: usize, harmonics: &[f64; COEFFICIENTS]) -> f64 {
-        let mut products = [0.0; PAIRS];
-        symmetric(&mut products, harmonics, harmonics);
-        self.energy[channel] - 2.0 * sum_of_products(harmonics, &self.right[channel])
-            + sum_of_products(&products, &self.products[channel])
+        let squares = sum_of_products(harmonics, &self.times(channel, harmonics));
+        self.energy[channel] - 2.0 * sum_of_products(harmonics, &self.right[channel]) + squares
     }
 
     /// The product of two terms of a light.
@@ -227,18 +212,8 @@ impl CurveStatistics {
     }
 }
 
-/// The sum of products, as far as the shorter list goes: in four sums, which do not wait for each other.
-fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
-    let length = a.len().min(b.len());
-    let (mut a, mut b) = (a[..length].chunks_exact(4), b[..length].chunks_exact(4));
-    let mut sums = [0.0; 4];
-    for (a, b) in a.by_ref().zip(b.by_ref()) {
-        for i in 0..4 {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    let rest = a.remainder().iter().zip(b.remainder());
-    sums.iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
+fn sum_of_products(a: &[f64; COEFFICIENTS], b: &[f64; COEFFICIENTS]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 pub(crate) fn all_statistics(curves: &TurnCurves) -> Vec<CurveStatistics> {
