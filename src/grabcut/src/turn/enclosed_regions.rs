@@ -91,11 +91,14 @@ impl TurnField {
     }
 
     /// Whether a part of a mask that seems to be background is so clearly that the mask may be called wrong. In a room
-    /// in which nothing moves, only the table and what is overexposed are clear.
+    /// in which nothing moves, only the table is clear.
     pub(crate) fn is_clearly_background(&self, part: &Bitmap, mask: &Bitmap, moves: bool) -> bool {
         let beside = self.beside(part, &mask.minus(part));
         if self.is_like_table(part, &beside) {
             return self.shows_table(part, mask);
+        }
+        if !moves {
+            return false;
         }
         let above = self
             .seen_table
@@ -111,7 +114,6 @@ impl TurnField {
             .temporal_evidence
             .towards_ground(above, &beside, &ground)
         {
-            _ if !moves => false,
             Some(towards) => towards >= CLEARLY,
             None => self.ends_without_edge(part, mask),
         }
