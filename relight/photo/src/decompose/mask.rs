@@ -103,6 +103,7 @@ pub(super) fn is_empty(mask: &Planes<1>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use relight_core::image::Extent;
 
     /// A bright ring of radius 6 to 12 about (20, 20), black inside, and a speck far away.
     fn ring(background: f32) -> Planes<3> {
