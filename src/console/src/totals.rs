@@ -59,7 +59,7 @@ impl RunTotals {
             _ => String::new(),
         };
         console.print_phase(
-            &format!("{done} of {of} recordings done{until}"),
+            &format!("{done} of {of} done{until}"),
             &Event::Total {
                 done,
                 of,

@@ -103,11 +103,10 @@ pub struct CheckOutput {
 /// writes a page and a record about it.
 ///
 /// # Errors
-/// [`MaskingError::Session`] without a recording; otherwise [`MaskingError::Recording`] around the cause.
+/// [`MaskingError::Session`] without a recording; otherwise what went wrong with it, which does not name it.
 pub fn check_mask(input: &Path, mask: Option<&Path>) -> Result<CheckOutput, MaskingError> {
     let recording = Recording::open(input)?;
-    let checked = check_recording(&recording, mask);
-    let (report, page) = checked.map_err(MaskingError::in_recording(&recording))?;
+    let (report, page) = check_recording(&recording, mask)?;
     Ok(CheckOutput {
         recording: recording.id,
         report,

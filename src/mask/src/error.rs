@@ -88,14 +88,6 @@ pub enum MaskingError {
         /// The system's error.
         source: io::Error,
     },
-    /// Any of the others, with the recording's id.
-    #[error("{recording}: {source}")]
-    Recording {
-        /// The recording's id.
-        recording: String,
-        /// What went wrong.
-        source: Box<Self>,
-    },
 }
 
 impl MaskingError {
@@ -104,7 +96,6 @@ impl MaskingError {
     pub fn handmade(&self) -> Option<&Path> {
         match self {
             Self::Handmade(mask) => Some(mask),
-            Self::Recording { source, .. } => source.handmade(),
             _ => None,
         }
     }
@@ -128,14 +119,5 @@ impl MaskingError {
     ) -> Self {
         let (path, why) = (path.into(), why.to_string());
         Self::Unusable { what, path, why }
-    }
-
-    /// Names the recording that it is about.
-    pub(super) fn in_recording(recording: &session::Recording) -> impl Fn(Self) -> Self + use<> {
-        let recording = recording.id.clone();
-        move |source| Self::Recording {
-            recording: recording.clone(),
-            source: Box::new(source),
-        }
     }
 }

@@ -37,38 +37,28 @@ pub struct MaskOutput {
 /// anything before fails.
 ///
 /// # Errors
-/// [`MaskingError::Session`] without a recording; otherwise [`MaskingError::Recording`] around the cause.
+/// [`MaskingError::Session`] without a recording; otherwise what went wrong with it, which does not name it.
 pub fn make_mask(
     input: &Path,
     output: Option<MaskFiles>,
     request: &MaskRequest,
 ) -> Result<MaskOutput, MaskingError> {
     let recording = Recording::open(input)?;
-    let made = mask_recording(&recording, output, request);
-    let (files, record, notice) = made.map_err(MaskingError::in_recording(&recording))?;
+    let files = files_of(&recording, output)?;
+    let _made = make_folder(&files)?;
+    check_replaceable(&files, request.force)?;
+    let video = Video::open(&recording.video)?;
+    if !request.force {
+        check_same_input(&files, &recording, &video)?;
+    }
+    let (request, notice) = with_strokes(request, &files, &video)?;
+    let record = segment_and_write(&video, &files, &request)?;
     Ok(MaskOutput {
         recording: recording.id,
         files,
         record,
         notices: recording.notices.into_iter().chain(notice).collect(),
     })
-}
-
-fn mask_recording(
-    recording: &Recording,
-    output: Option<MaskFiles>,
-    request: &MaskRequest,
-) -> Result<(MaskFiles, MaskRecord, Option<Notice>), MaskingError> {
-    let files = files_of(recording, output)?;
-    let _made = make_folder(&files)?;
-    check_replaceable(&files, request.force)?;
-    let video = Video::open(&recording.video)?;
-    if !request.force {
-        check_same_input(&files, recording, &video)?;
-    }
-    let (request, notice) = with_strokes(request, &files, &video)?;
-    let record = segment_and_write(&video, &files, &request)?;
-    Ok((files, record, notice))
 }
 
 fn segment_and_write(

@@ -79,7 +79,7 @@ pub struct PageServer {
 
 impl PageServer {
     /// Serves the page from its own threads until `shutdown` is cancelled. Requests carry a [`LocalAddress`]. `announce`
-    /// is called once, by one of the server's threads, when a browser can connect.
+    /// is called once, on this thread and within the server's runtime, when a browser can connect.
     ///
     /// # Errors
     /// If the address cannot be listened on, or the system has no randomness or no threads.

@@ -13,14 +13,17 @@ impl RelightableObject {
     pub fn in_place(&self, photo: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
         let mut picture = self.blended(photo.clone(), recoloured, colours);
         if let Some(fringe) = &self.fringe {
-            let gains = fringe.gains(&self.matte.alpha, &self.matte.foreground, colours);
+            let part = || photo.planes().cut(self.place, self.extent());
+            let gains = fringe.gains(part, &self.matte.alpha, &self.matte.foreground, colours);
             let [left, top] = self.place;
             let width = self.photo.width;
             let planes = picture.planes_mut().planes_mut();
             for (plane, gains) in planes.into_iter().zip(gains.planes()) {
                 for (y, gains) in gains.chunks(self.extent().width).enumerate() {
                     let line = &mut plane[(top + y) * width + left..];
-                    line.iter_mut().zip(gains).for_each(|(value, gain)| *value *= gain);
+                    line.iter_mut()
+                        .zip(gains)
+                        .for_each(|(value, gain)| *value *= gain);
                 }
             }
         }

@@ -39,13 +39,10 @@ impl Cut {
             .cut(place, extent)
             .map(|m| f32::from(u8::from(m >= 0.5)));
         let (matte, fringe) = match alpha {
-            Some(alpha) => (
-                Matte::from_alpha(&picture, &alpha.cut(place, extent)),
-                None,
-            ),
+            Some(alpha) => (Matte::from_alpha(&picture, &alpha.cut(place, extent)), None),
             None => (
                 Matte::estimate(&picture, &mask, edge),
-                Some(Fringe::estimate(&picture, &mask, edge)),
+                Some(Fringe::new(&mask, edge)),
             ),
         };
         Ok(Self {

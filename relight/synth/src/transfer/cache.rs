@@ -135,6 +135,9 @@ fn decode(bytes: &[u8]) -> Option<RadianceTransfer> {
     }
     let end = bytes.iter().position(|&byte| byte == b'\n')?;
     let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
+    if header.format != FORMAT {
+        return None;
+    }
     let count = header.pixels;
     let (pixels, halves) = bytes[end + 1..].split_at_checked(4 * count)?;
     let halves = halves.as_chunks().0.iter();

@@ -21,10 +21,8 @@ use crate::network::predict::TurnPrediction;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
-/// Mean error of normals over what the network expects, in unknown light. Measured: (docs/results/turns.md).
+/// Mean error of normals over what the network expects. Measured: (docs/results/turns.md).
 const CALIBRATION: f64 = 1.14;
-/// The same in known light. Measured: (docs/results/turns.md).
-const CALIBRATION_IN_KNOWN: f64 = 1.0;
 
 /// The network's answer for a turn, with the light: a `known` one, in the viewer's frame at the table's angle 0, of which bands
 /// up to 6 count, or the one that fits. The albedo is the mean of its answer and of what the network of photographs has `seen`;
@@ -47,18 +45,15 @@ pub(crate) fn solve_by_network(
     let mut albedo = mean_albedo(curves, &found.albedo, seen);
     let statistics = all_statistics(curves);
     let frame = TableFrame::new(elevation);
-    let calibrated = |factor: f64| -> Vec<f64> {
-        let expected = curves.pixels_of(&found.expected_errors);
-        expected
-            .map(|[degrees]| (factor * degrees).to_radians().min(FRAC_PI_2))
-            .collect()
-    };
-    let mut expected_errors = calibrated(CALIBRATION);
+    // In known light, too: it makes some objects worse, such as a glossy one.
+    let expected_errors: Vec<f64> = curves
+        .pixels_of(&found.expected_errors)
+        .map(|[degrees]| (CALIBRATION * degrees).to_radians().min(FRAC_PI_2))
+        .collect();
     let (model, factors) = match known {
         Some(light) => {
             let model = ShadingModel::in_light(light, frame, material);
             normals = refined(curves, &statistics, &model, &normals, &expected_errors);
-            expected_errors = calibrated(CALIBRATION_IN_KNOWN);
             let fitted: Vec<[f64; 3]> = (statistics.iter().zip(&normals))
                 .map(|(statistics, &normal)| statistics.albedo(&model.harmonics(normal)))
                 .collect();

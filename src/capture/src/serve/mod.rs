@@ -45,12 +45,21 @@ const BLOCKING_THREADS: usize = 24;
 
 /// The rig could not be served: the address is taken, not this machine's, or not allowed, or the system lacks threads.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "cannot listen on {address}: {source}; give another address or port, or end the program that has it"
-)]
+#[error("cannot serve at {address}: {source}; {}", remedy(source))]
 pub struct ServeError {
     address: SocketAddr,
     source: io::Error,
+}
+
+fn remedy(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::AddrInUse
+        | io::ErrorKind::AddrNotAvailable
+        | io::ErrorKind::PermissionDenied => {
+            "give another address or port, or end the program that has it"
+        }
+        _ => "end other programs, or start the machine again",
+    }
 }
 
 /// Whether the address can be listened on, as things are.

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::marker::PhantomData;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::thread;
 
@@ -89,6 +89,9 @@ impl Clock {
     }
 
     /// Runs `body`, which may start threads that borrow local values, and waits for their ends.
+    ///
+    /// # Panics
+    /// If a thread panics whose handle was dropped.
     pub fn scope<'env, T>(&self, body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T) -> T {
         thread::scope(|scope| {
             let scope = Scope {
@@ -116,6 +119,12 @@ impl Clock {
             let _at_end = at_end;
             let result = catch_unwind(AssertUnwindSafe(work));
             ended.update(|ended| *ended = Some(result));
+            // A panic of which nobody will learn by joining goes on, to the scope if there is one.
+            if Arc::strong_count(&ended) == 1
+                && let Some(Err(panic)) = ended.lock().take()
+            {
+                resume_unwind(panic);
+            }
         };
         (run, handle)
     }

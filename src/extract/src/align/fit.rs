@@ -192,7 +192,7 @@ impl WithSimd for Summing<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Sums {
         let mut sums = Sums::default();
         // Within a piece, single precision suffices.
-        for pixels in self.template.pixels.chunks(self.template.piece) {
+        for pixels in self.template.pixels.chunks(self.template.piece.max(1)) {
             let mut piece = [0.0_f32; TERMS];
             for pixel in pixels {
                 if let Some(found) = self.sampler.at(pixel) {

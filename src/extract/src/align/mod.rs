@@ -227,22 +227,29 @@ impl Aligner {
             min_confidence: MIN_CONFIDENCE,
             motion: Motion::default(),
         };
-        let (found, agreements): (Vec<Alignment>, Vec<Option<f64>>) = samples
-            .par_iter()
-            .map_init(AlignBuffers::default, |buffers, sample| {
-                let AlignBuffers { lumas, gradients } = buffers;
-                let lumas = aligner.required_regions.lumas_of_sample(&sample.0, lumas);
-                aligner.located(lumas, gradients)
-            })
-            .unzip();
+        let locate = |aligner: &Self| -> (Vec<Alignment>, Vec<Option<f64>>) {
+            let located = samples
+                .par_iter()
+                .map_init(AlignBuffers::default, |buffers, sample| {
+                    let AlignBuffers { lumas, gradients } = buffers;
+                    let lumas = aligner.required_regions.lumas_of_sample(&sample.0, lumas);
+                    aligner.located(lumas, gradients)
+                });
+            located.unzip()
+        };
+        let (mut found, agreements) = locate(&aligner);
+        if let Some(patches) = &mut aligner.patches {
+            // Until it is known what is usual, all patches were believed.
+            let agreements: Vec<f64> = agreements.into_iter().flatten().collect();
+            if !patches.expect(&agreements) {
+                (found, _) = locate(&aligner);
+            }
+        }
         let usable = found.get(reference)?.shift.is_some();
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = upper_median(registered.map(|found| found.confidence)).unwrap_or_default();
         aligner.min_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
         aligner.motion = Motion::from_alignments(&found, reference);
-        if let Some(patches) = &mut aligner.patches {
-            patches.expect(agreements.into_iter().flatten());
-        }
         usable.then_some(aligner)
     }
 
@@ -324,7 +331,10 @@ impl Aligner {
                 .filter(|_| scale == 0 && found.is_some());
             let by_patches = by_patches
                 .and_then(|by| by.fit(luma, start, still, extractor, patches))
-                .filter(|(fit, _)| self.is_sure(fit));
+                .filter(|(fit, _)| {
+                    let is_near = fit.shift.iter().all(|shift| shift.abs() <= reach);
+                    is_near && self.is_sure(fit)
+                });
             found = match by_patches {
                 Some((fit, agreement)) => Some((fit, Some(agreement))),
                 None => {

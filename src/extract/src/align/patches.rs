@@ -83,9 +83,14 @@ impl Patches {
         })
     }
 
-    /// Asks of frames what is usual in a turn, by the parts of the patches that agree in some of its frames.
-    pub(super) fn expect(&mut self, agreements: impl Iterator<Item = f64>) {
-        self.min_agreement = MIN_AGREEMENT * upper_median(agreements).unwrap_or_default();
+    /// Asks of frames what is usual in a turn, by the parts of the patches that agree in some of its frames. Whether in all
+    /// of these enough do.
+    pub(super) fn expect(&mut self, agreements: &[f64]) -> bool {
+        let usual = upper_median(agreements.iter().copied()).unwrap_or_default();
+        self.min_agreement = MIN_AGREEMENT * usual;
+        agreements
+            .iter()
+            .all(|agrees| *agrees >= self.min_agreement)
     }
 
     /// The fit nearest to `start` and the part of the patches that agrees; `None` if it is not to be believed.

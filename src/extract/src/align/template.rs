@@ -42,8 +42,8 @@ pub(super) struct TemplatePixel {
 pub(super) struct Template {
     /// Tile by tile.
     pub(super) pixels: Vec<TemplatePixel>,
-    /// As many that follow each other lie together, and their errors are taken for one: light that passes pulls at all of
-    /// them.
+    /// About as many that follow each other lie together, and their errors are taken for one: light that passes pulls at all
+    /// of them.
     pub(super) piece: usize,
 }
 

@@ -90,7 +90,7 @@ fn patches_tell_the_shift_of_the_whole_object() {
 fn patches_that_agree_less_than_usual_are_not_believed() {
     let [mut doubtful, mut whole] = [0, 1].map(|_| learnt(|_| [0.0; 2]));
     whole.patches = None;
-    doubtful.patches.as_mut().unwrap().expect([2.0].into_iter());
+    doubtful.patches.as_mut().unwrap().expect(&[2.0]);
     for (shift, at) in [([0.4, -0.7], 5), ([2.3, 1.1], 11)] {
         let frame = frame(shift, angle(at, 20));
         assert_eq!(measured(&doubtful, &frame), measured(&whole, &frame));

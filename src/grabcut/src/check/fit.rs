@@ -124,8 +124,11 @@ impl<'a> MaskCheck<'a> {
         // The curves compare a part with the rest of the mask, which is no witness where it is the smaller one.
         let witnessed = 2 * leaks.count() < self.mask.count();
         let clear = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
+            // A draft only has to suspect.
+            let is_clear =
+                || effort == Effort::Draft || turn.is_clearly_background(part, mask, moves);
             turn.is_background(part, mask)
-                .filter(|found| !found || turn.is_clearly_background(part, mask, moves))
+                .filter(|found| !found || is_clear())
         };
         let undecided = self.shown(&leaks, |turn, part, mask| clear(turn, part, mask).is_none());
         let leaks = self.shown(&leaks, |turn, part, mask| {
@@ -133,9 +136,6 @@ impl<'a> MaskCheck<'a> {
         });
         let leaks = leaks.or(&self.table_seen());
         let whiskers = self.whiskers(&own);
-        if !moves && leaks.count() + whiskers.count() == 0 {
-            return Ok(None);
-        }
         let (missing, filled) = if moves {
             // Whatever the turn's own mask says of a hole, the picture in it decides.
             let is_filled = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
@@ -148,16 +148,21 @@ impl<'a> MaskCheck<'a> {
         };
         let undisputed = leaks.count() + missing.count() + undecided.count() == 0;
         let least = self.mask.count() as f64 * SMALL;
-        Ok(Some(ShapeCheck {
+        // Where hardly anything moves, no outline follows it.
+        let outline = |mask: &Bitmap| {
+            if moves { self.turn.outline(mask) } else { 0.0 }
+        };
+        let shape = ShapeCheck {
             area_px: self.mask.count(),
-            outline: self.turn.outline(&self.mask),
-            outline_of_turn: self.turn.outline(&own),
-            contradicted: !moves || witnessed && differing > 0 && undisputed,
+            outline: outline(&self.mask),
+            outline_of_turn: outline(&own),
+            contradicted: witnessed && differing > 0 && undisputed,
             leaks: regions(&leaks, least),
             whiskers: regions(&whiskers, 0.0),
             missing: regions(&missing, least),
             holes: regions(&filled, least),
-        }))
+        };
+        Ok((moves || !shape.faults().is_empty()).then_some(shape))
     }
 
     /// Of parts in which the mask may be wrong, those that the turn shows to be background, or object. The

@@ -337,8 +337,12 @@ fn shaded(off: &[f32], as_unshaded: &Bitmap, object: &Bitmap) -> Bitmap {
     let is_even = |at: usize| {
         let near = [-reach, reach].map(|by| [by, by * width as isize]);
         let near = near.iter().flatten();
-        near.filter_map(|by| off.get(at.checked_add_signed(*by)?))
-            .all(|other| (other - off[at]).abs() <= EVEN)
+        let others = near.filter_map(|by| at.checked_add_signed(*by));
+        // Not those at the other end of the next row.
+        let mut others = others
+            .filter(|other| (other % width).abs_diff(at % width) <= EVEN_REACH)
+            .filter_map(|other| off.get(other));
+        others.all(|other| (other - off[at]).abs() <= EVEN)
     };
     let outline = object.or(&enclosed(object, width));
     let least = (object.count() as f64 * LEAST_SHADED) as u64;

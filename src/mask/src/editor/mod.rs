@@ -33,8 +33,7 @@ const AT_ONCE: usize = 2;
 /// written before the mask is accepted; the result is `None` if it was discarded.
 ///
 /// # Errors
-/// [`MaskingError::Session`] without a recording, [`MaskingError::Serve`], or [`MaskingError::Recording`]
-/// around the cause.
+/// [`MaskingError::Session`] without a recording, [`MaskingError::Serve`], or what went wrong with it.
 pub fn edit(
     input: &Path,
     output: Option<MaskFiles>,
@@ -43,18 +42,16 @@ pub fn edit(
     announce: impl FnOnce(&Announcement),
 ) -> Result<Option<MaskOutput>, MaskingError> {
     let recording = Recording::open(input)?;
-    let of_recording = MaskingError::in_recording(&recording);
     let files = files_of(&recording, output)?;
-    let _made = make_folder(&files).map_err(&of_recording)?;
-    check_replaceable(&files, request.force).map_err(&of_recording)?;
-    let video = Video::open(&recording.video).map_err(|error| of_recording(error.into()))?;
+    let _made = make_folder(&files)?;
+    check_replaceable(&files, request.force)?;
+    let video = Video::open(&recording.video)?;
     if !request.force {
-        check_same_input(&files, &recording, &video).map_err(&of_recording)?;
+        check_same_input(&files, &recording, &video)?;
     }
-    let (request, notice) = with_strokes(&request, &files, &video).map_err(&of_recording)?;
+    let (request, notice) = with_strokes(&request, &files, &video)?;
     let request = request.into_owned();
-    let session = EditorSession::new(&recording, video, files.clone(), request);
-    let session = session.map_err(&of_recording)?;
+    let session = EditorSession::new(&recording, video, files.clone(), request)?;
     let record = serve(session, address, announce)?;
     Ok(record.map(|record| MaskOutput {
         recording: recording.id,
