@@ -37,7 +37,7 @@ impl Fringe {
     }
 
     /// How much of each pixel beyond the soft edge belongs to the object, 0 to 1: what of the picture, of linear light, looks
-    /// like the object beside it, by the guided filter (He, Sun and Tang, *Guided Image Filtering*, 2013): with I the colours
+    /// like the nearby object, by the guided filter (He, Sun and Tang, *Guided Image Filtering*, 2013): with I the colours
     /// and p the mask, in each window the line `a I + b` that is nearest to p,
     ///
     /// ```text

@@ -21,10 +21,10 @@ const MIN_COVERAGE_DEG: f64 = 330.0;
 /// by 7 to 14 degrees, and those above by 14 to 22 (docs/results/turns.md).
 const MAX_EXPECTED_DEG: f64 = 15.0;
 
-/// What to do about a turn of which nearly all is clipped over half of the turn or more.
+/// What to do about a turn that is nearly all clipped over half of it or more.
 const OVEREXPOSED: &str = "the object is overexposed: nearly all of it is clipped for half the turn or more; lower exposure or \
                            gain, and capture again";
-/// What to do about a turn of which nearly all is black.
+/// What to do about a turn that is nearly all black.
 const UNDEREXPOSED: &str = "the object is underexposed: nearly all of it is black; lengthen the exposure or add light, and \
                             capture the turn again";
 
