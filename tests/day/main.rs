@@ -26,6 +26,7 @@ use rig::{LONG_TURN, Rig, SHORT_TURN};
 
 fn main() -> ExitCode {
     let mut trials = trials![with chromium::find =>
+        phone::a_tap_follows_what_moved_under_the_finger_and_meets_nothing_else,
         trouble::what_is_not_there_is_named_by_headline_and_button,
         trouble::a_take_that_a_person_stopped_is_no_fault,
         trouble::a_page_goes_on_with_a_rig_that_was_started_again,

@@ -20,6 +20,14 @@ const CUT_OFF: &str = "[...document.querySelectorAll('body *')].filter((part) =>
     const tight = ['BUTTON', 'A', 'DD'].includes(part.tagName) && part.scrollWidth > part.clientWidth + 1 && part.clientWidth > 0; \
     return over || tight; }).map((part) => `${part.tagName} ${part.id}: ${part.textContent.slice(0, 40)}`).join('; ')";
 
+/// A button that makes room for another one under the first finger that touches it.
+const MOVES: &str = "data:text/html,<meta name=viewport content=width=device-width> \
+    <style>button { position: absolute; top: 0; width: 99px; height: 99px }</style> \
+    <button id=other></button><button id=wanted></button> \
+    <script>const met = []; \
+        addEventListener('touchstart', () => { wanted.style.top = '300px' }); \
+        for (const button of [wanted, other]) button.onclick = () => met.push(button.id)</script>";
+
 /// A browser with a finger.
 #[derive(Debug)]
 pub(crate) struct Phone {
@@ -124,6 +132,12 @@ impl Phone {
             fs::write(folder.join(name), self.page.picture(whole)).unwrap();
         }
     }
+}
+
+pub(crate) fn a_tap_follows_what_moved_under_the_finger_and_meets_nothing_else(browser: PathBuf) {
+    let mut page = Chromium::open(&browser, MOVES, SCREEN, true);
+    page.tap("#wanted");
+    assert_eq!(page.value("met.join(' ')"), "wanted");
 }
 
 fn screen() -> (u32, u32) {

@@ -33,6 +33,8 @@ const ARGUMENTS: [&str; 11] = [
 /// Longest wait for anything, unless told otherwise; all comes far sooner.
 const LONG: Duration = Duration::from_secs(60);
 const PAUSE: Duration = Duration::from_millis(50);
+/// After so long a tap counts as lost: it met something that takes none.
+const LOST: Duration = Duration::from_secs(10);
 
 /// A screen, and what it is touched with.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +43,19 @@ struct Screen {
     height: u32,
     is_phone: bool,
 }
+
+/// Catches the click of a tap before the page does, and notes whether it meets what is meant. If the page moved under the
+/// finger, so that it meets something else, it does nothing there.
+const CATCH_CLICKS: &str = "if (!window.tapped) { \
+    window.tapped = {}; \
+    addEventListener('click', (event) => { \
+        const { meant } = window.tapped; \
+        if (meant === undefined || !event.isTrusted) return; \
+        const wanted = meant && document.querySelector(meant); \
+        const met = Boolean(wanted && wanted.contains(event.target)); \
+        window.tapped = { met }; \
+        if (!met) { event.preventDefault(); event.stopImmediatePropagation(); } \
+    }, true); }";
 
 /// What the browser says about a page that gives way to another while it is asked.
 const PAGE_IS_GOING: [&str; 2] = ["context", "navigated or closed"];
@@ -244,11 +259,12 @@ impl Chromium {
         );
     }
 
-    /// Scrolls to what a person would touch and touches its middle with a finger, once it is there. Fails where it is
-    /// not shown, stays disabled, or lies below something else.
+    /// Scrolls to what a person would touch and touches its middle with a finger, once it is there; again where the page
+    /// moved meanwhile. Fails where it is not shown, stays disabled, or lies below something else.
     pub fn tap(&mut self, selector: &str) {
         let expression = format!(
-            "(() => {{ const wanted = document.querySelector({selector:?}); \
+            "(() => {{ {CATCH_CLICKS} \
+                const wanted = document.querySelector({selector:?}); \
                 if (!wanted) return 'is not there'; \
                 if (wanted.disabled) return 'is disabled'; \
                 wanted.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
@@ -256,20 +272,44 @@ impl Chromium {
                 if (box.width === 0 || box.height === 0) return 'is not shown'; \
                 const place = [box.left + box.width / 2, box.top + box.height / 2]; \
                 const found = document.elementFromPoint(...place); \
-                if (found && (wanted.contains(found) || found.contains(wanted))) return place; \
-                return `lies below ${{found?.id || found?.tagName}}`; }})()"
+                if (!wanted.contains(found)) return `lies below ${{found?.id || found?.tagName}}`; \
+                window.tapped = {{ meant: {selector:?} }}; \
+                return place; }})()"
         );
         let began = Instant::now();
         loop {
             let place = self.value_now(&expression).unwrap_or_default();
             if let Ok(place) = serde_json::from_value(place.clone()) {
-                return self.touch(&[vec![place]]);
+                self.touch(&[vec![place]]);
+                if self.has_met() {
+                    return;
+                }
             }
             assert!(
                 began.elapsed() < LONG,
                 "{selector} cannot be tapped: it {place}"
             );
             sleep(PAUSE);
+        }
+    }
+
+    /// Whether the click of a tap met what was meant. One that comes later than that meets nothing.
+    fn has_met(&mut self) -> bool {
+        let began = Instant::now();
+        loop {
+            let is_lost = began.elapsed() > LOST;
+            let otherwise = if is_lost {
+                "(window.tapped = { meant: '' }, false)"
+            } else {
+                "null"
+            };
+            let met = format!("window.tapped ? window.tapped.met ?? {otherwise} : true");
+            match self.value_now(&met) {
+                // The click has led to another page.
+                None => return true,
+                Some(Value::Bool(met)) => return met,
+                Some(_) => sleep(PAUSE),
+            }
         }
     }
 
