@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use relit_turntable::simulator::Simulator;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
@@ -44,6 +45,8 @@ pub(crate) const LONG_TURN: Turn = Turn {
     longest: Duration::from_secs(1800),
 };
 
+/// The name of the table's port, in the folder of the rig.
+const PORT: &str = "table";
 /// The variable with the address to listen on.
 const LISTEN: &str = "RELIT_TEST_LISTEN";
 
@@ -72,12 +75,23 @@ impl Rig {
 
     /// With another camera or table.
     pub(crate) fn start_at(turn: &'static Turn, camera: &str, table: &str) -> Self {
+        Self::start_in(tempfile::tempdir().unwrap(), turn, camera, table)
+    }
+
+    /// With a table that the test has in its hands, at a port.
+    pub(crate) fn start_with(turn: &'static Turn, table: &Simulator) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        symlink(table.path(), folder.path().join(PORT)).unwrap();
+        Self::start_in(folder, turn, &turn.camera(), &format!("serial:{PORT}"))
+    }
+
+    fn start_in(folder: tempfile::TempDir, turn: &'static Turn, camera: &str, table: &str) -> Self {
         for program in ["relit-mask", "relit-extract"] {
             assert!(relit_tests::program(program).is_file());
         }
         let mut command = program(&relit_tests::program("relit-capture"));
         command.args(["serve", "--camera", camera, "--turntable", table]);
-        Self::serve(command, turn, tempfile::tempdir().unwrap())
+        Self::serve(command, turn, folder)
     }
 
     /// As on a machine that has the rig's program alone.

@@ -4,6 +4,8 @@
 use std::fs;
 use std::path::PathBuf;
 
+use relit_turntable::simulator::{Simulator, SimulatorOptions};
+
 use crate::phone::Phone;
 use crate::rig::{Rig, SHORT_TURN, SLOW_TURN};
 
@@ -116,17 +118,21 @@ pub(crate) fn a_second_tap_on_start_is_no_stop(browser: PathBuf) {
 
 pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(browser: PathBuf) {
     let longest = SLOW_TURN.longest;
-    let table = "sim:?fault=estop@30s:10s";
-    let rig = Rig::start_at(&SLOW_TURN, &SLOW_TURN.camera(), table);
+    // Its emergency stop is pressed when the page is so far, however long that takes.
+    let simulator = Simulator::start(&SimulatorOptions::default(), None).unwrap();
+    let rig = Rig::start_with(&SLOW_TURN, &simulator);
     let mut phone = Phone::open(&browser, &rig.url, "emergency");
     phone.write("#object", "calf");
     phone.wait_button("Start calf", true);
     phone.tap("#go");
     phone.wait_button("Stop", true);
+    phone.wait_so_long("document.getElementById('progress').value > 0.02", longest);
+    simulator.table().press_emergency_stop(true);
     phone.wait_text_so_long("#alarm", "release it", longest);
     phone.wait_button("Release the emergency stop", false);
     phone.value("scrollTo(0, 0)");
     phone.see("pressed");
+    simulator.table().press_emergency_stop(false);
     phone.wait_text_so_long("#phase", "The table is locked", longest);
     phone.wait_button("Reset and home the table", true);
     phone.see("released");
