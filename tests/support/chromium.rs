@@ -30,8 +30,9 @@ const ARGUMENTS: [&str; 11] = [
     "--hide-scrollbars",
     "--remote-debugging-pipe",
 ];
-/// Longest wait for anything, unless told otherwise; all comes far sooner.
-const LONG: Duration = Duration::from_secs(60);
+/// Longest wait for anything, unless told otherwise, on a machine that is busy with something else; all comes far
+/// sooner.
+const LONG: Duration = Duration::from_secs(300);
 const PAUSE: Duration = Duration::from_millis(50);
 /// After so long a tap counts as lost: it met something that takes none.
 const LOST: Duration = Duration::from_secs(10);

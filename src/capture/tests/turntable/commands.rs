@@ -53,7 +53,8 @@ impl Simulated {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        for _ in 0..600 {
+        // As long as a machine takes that is busy with something else.
+        for _ in 0..3000 {
             if self.simulator.table().edges().len() > 100 {
                 return jog;
             }
