@@ -116,13 +116,11 @@ fn a_finger_draws_and_two_zoom_on_a_phone() {
         vec![[x - way, y], [x + way, y]]
     };
     page.touch(&[apart(40.0), apart(60.0), apart(80.0)]);
-    let zoomed = EditorCanvas::find(&mut page);
-    assert!(
-        zoomed.scale > 1.7 * screen.scale,
-        "{} {}",
-        zoomed.scale,
-        screen.scale
-    );
+    // The page notes its view with the next picture of the screen.
+    page.wait_for(&format!(
+        "Number(canvas.dataset.view.split(' ')[0]) > {}",
+        1.7 * screen.scale
+    ));
     assert_eq!(strokes(&mut page), 0);
     page.click("#fit");
     page.wait_for(&format!(
