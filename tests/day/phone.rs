@@ -20,6 +20,9 @@ const CUT_OFF: &str = "[...document.querySelectorAll('body *')].filter((part) =>
     const tight = ['BUTTON', 'A', 'DD'].includes(part.tagName) && part.scrollWidth > part.clientWidth + 1 && part.clientWidth > 0; \
     return over || tight; }).map((part) => `${part.tagName} ${part.id}: ${part.textContent.slice(0, 40)}`).join('; ')";
 
+/// Gives everything at once the colour that it is on its way to.
+const FINISH: &str = "document.getAnimations().forEach((change) => change.finish())";
+
 /// A button that makes room for another one under the first finger that touches it.
 const MOVES: &str = "data:text/html,<meta name=viewport content=width=device-width> \
     <style>button { position: absolute; top: 0; width: 99px; height: 99px }</style> \
@@ -128,6 +131,7 @@ impl Phone {
     fn take(&mut self, what: &str, whole: bool) {
         self.taken += 1;
         if let Some(folder) = &self.pictures {
+            self.page.value(FINISH);
             let name = format!("{}-{:02}-{what}.jpg", self.name, self.taken);
             fs::write(folder.join(name), self.page.picture(whole)).unwrap();
         }
