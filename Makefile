@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-app setup-train training-data train-turn test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network sheet docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-app setup-train training-data test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network sheet docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -63,15 +63,6 @@ training-data: ## Download objects and panoramas (210 MB) and pack them into LIB
 	    --meshes $(TARGET)/training-data/furniture $(MESHES) \
 	    --panoramas $(TARGET)/training-data/panoramas $(PANORAMAS) \
 	    || [[ $$? == 3 ]]
-
-# DATA has the folders meshes, panoramas and held, with the files that relight/cli/weights/README.md names. It continues a stopped run.
-RUNS ?= $(CURDIR)/$(TARGET)/train-turn
-
-train-turn: setup-train ## Train the network of relight turn from the folder DATA into RUNS
-	@[[ -d "$(DATA)/panoramas" ]] || { echo "name the folder of the data: make train-turn DATA=FOLDER"; exit 1; }
-	cargo build --locked --release -p relight --features train
-	@program="$$(realpath $(TARGET)/release/relight)"; mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; cd "$(DATA)"; \
-	"$$program" train turn --settings "$(CURDIR)/relight/cli/weights/turn.toml" --resume -o "$$runs"
 
 # Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
 test: setup ## Run all tests; those of training where libtorch is installed

@@ -58,6 +58,7 @@ pub use samples::sample::SynthSample;
 pub use sequence::{FrameTruth, SequenceDescription, SequenceRecipe, write_sequences};
 pub use shape::ShapeKind;
 pub use transfer::{
-    EnvironmentLights, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint, PhotoView,
-    PhotoViewRecipe, TransferCache, TransferRecipe, TurnSample, ViewLamp,
+    CURVE_TERMS, CurveTerms, EnvironmentLights, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan,
+    PhotoPrint, PhotoView, PhotoViewRecipe, TurnMaterial, TurnPlan, TurnView, TurnViewRecipe,
+    ViewLamp, terms_of,
 };

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `engine` | any run: a [`relight_photo::nets::Graph`] on tensors, the optimiser, checkpoints, the log, what ends a run |
 //! | `tasks` | what is trained: `decompose_task` (photographs), `turn_task` (turns), `paper_task` (the paper's phases); their losses, `low_rank`, `validation` |
-//! | `data` | `photographs` lit on the device, `synthetic_turns` |
+//! | `data` | `photographs` and `turns` lit on the device |
 //! | `distributed` | several processes: their ranks, sums over them |
 //! | `settings` | [`RunSettings`] and others, in TOML |
 //!

@@ -224,48 +224,39 @@ fn a_run_that_was_stopped_goes_on_to_the_same_losses_and_weights() {
     assert!(whole.path().join("validation.png").is_file());
 }
 
-fn turn_task(steps: u64, views: &Path) -> (TurnNetworkTask, RunSettings) {
+fn turn_task(steps: u64, workers: usize) -> (TurnNetworkTask, RunSettings) {
     let settings = TurnNetworkSettings {
         run: small_run(steps),
         data: TransferSettings {
             size: 32,
-            views: 3,
-            first_views: 2,
+            views: 5,
+            first_views: 4,
             new_views: 1,
             rays: 16,
-            coarse_part: 0.0,
             variants: 1,
             validation: 2,
             ..TransferSettings::default()
         },
     };
     let run = settings.run.clone();
-    let task = TurnNetworkTask::new(settings, views, resources(), None).unwrap();
+    let resources = Resources {
+        workers,
+        ..resources()
+    };
+    let task = TurnNetworkTask::new(settings, resources, None).unwrap();
     (task, run)
 }
 
 #[test]
-fn a_run_of_the_network_of_turns_goes_on_to_the_same_weights_and_casts_no_view_twice() {
+fn a_run_of_the_network_of_turns_goes_on_to_the_same_weights_on_any_number_of_threads() {
     tch::set_num_threads(1);
-    let [views, whole, parted] = [(); 3].map(|()| tempfile::tempdir().unwrap());
-    let (mut task, settings) = turn_task(4, views.path());
+    let [whole, parted] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let (mut task, settings) = turn_task(4, 1);
     make_run(&mut task, &settings, whole.path(), (false, u64::MAX)).unwrap();
-    let cast = || {
-        let mut files: Vec<_> = fs::read_dir(views.path())
-            .unwrap()
-            .map(|entry| entry.unwrap())
-            .map(|entry| (entry.path(), entry.metadata().unwrap().modified().unwrap()))
-            .collect();
-        files.sort();
-        files
-    };
-    let before = cast();
-    assert!(!before.is_empty());
     for (resume, until) in [(false, 2), (true, u64::MAX)] {
-        let (mut task, settings) = turn_task(4, views.path());
+        let (mut task, settings) = turn_task(4, 3);
         make_run(&mut task, &settings, parted.path(), (resume, until)).unwrap();
     }
-    assert_eq!(cast(), before);
     assert_eq!(table(parted.path()), table(whole.path()));
     let weights = |folder: &Path| Weights::read(&folder.join("turn-net.safetensors")).unwrap();
     assert_eq!(weights(parted.path()), weights(whole.path()));

@@ -198,16 +198,7 @@ fn turn(arguments: &RunArguments, console: Console) -> CommandResult {
         console,
         |settings, resources| {
             let weights = read_weights(arguments.weights.as_deref())?;
-            let views = match &settings.data.view_folder {
-                Some(folder) => folder.clone(),
-                None => arguments.folder()?.join("views"),
-            };
-            Ok(TurnNetworkTask::new(
-                settings,
-                &views,
-                resources,
-                weights.as_ref(),
-            )?)
+            Ok(TurnNetworkTask::new(settings, resources, weights.as_ref())?)
         },
     )
 }

@@ -17,11 +17,11 @@ pub const ALBEDO_OUTPUTS: usize = 3;
 pub const LOG_MEANS: usize = 32;
 
 /// Channels that every pixel has of its own.
-const STEM: usize = 24;
+const STEM: usize = 32;
 /// Side of the blocks in which pixels enter and leave.
 const BLOCK: usize = 2;
 /// Channels of the encoder's steps.
-const ENCODER: [usize; 4] = [40, 72, 128, 176];
+const ENCODER: [usize; 4] = [56, 104, 176, 240];
 /// Channels that come back to a pixel.
 const FINE: usize = 16;
 /// Channels in a group of a normalisation.
@@ -92,6 +92,6 @@ mod tests {
         assert_eq!((albedo.channels, albedo.scale), (ALBEDO_OUTPUTS, Some(1)));
         assert_eq!(net.multiple(), 16);
         let count: usize = net.parameters().iter().map(|p| p.count()).sum();
-        assert!(2 * count < 6_000_000, "{count}");
+        assert!(2 * count < 11_000_000, "{count}");
     }
 }

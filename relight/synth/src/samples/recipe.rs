@@ -21,7 +21,7 @@ use crate::view::{Pose, Projection};
 /// Rays a pixel by which a scene learns how much of the sky it sees.
 pub(crate) const AMBIENT_RAYS: u32 = 16;
 /// Part of the objects that are meshes, if there are any.
-const MESHES: f32 = 0.25;
+pub(crate) const MESHES: f32 = 0.25;
 /// Least part of the picture that an object covers, where another view of it covers more.
 const MIN_COVER: f32 = 0.12;
 /// Views that are drawn at most until one covers as much.

@@ -21,7 +21,7 @@ use crate::random::{Random, stream};
 use crate::samples::camera::CameraModel;
 use crate::samples::finish::Finish;
 use crate::samples::png::{Rgb16, encode_sixteen};
-use crate::samples::recipe::{AMBIENT_RAYS, Recipe};
+use crate::samples::recipe::{AMBIENT_RAYS, MESHES, Recipe};
 use crate::samples::sample::{WhiteLevels, photograph};
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 
@@ -63,7 +63,7 @@ impl<'a> SimulatedSequence<'a> {
         let recipe = &turns.recipe;
         let seed = stream(stream(recipe.seed, 4), number);
         let mut random = Random::new(seed);
-        let (object, mesh) = standing_object(recipe, library, &mut random);
+        let (object, mesh) = standing_object(recipe, library, MESHES, &mut random);
         let stand = TablePose::draw(&mut random, ELEVATIONS);
         let scene = scene(recipe, &stand, &mesh, random.seed());
         let finish = Finish::draw(

@@ -73,14 +73,15 @@ impl TablePose {
     }
 }
 
-/// An object that can stand: sheets do not.
+/// An object that can stand: sheets do not. This part of them are meshes, if there are any.
 pub(crate) fn standing_object<'a>(
     recipe: &Recipe,
     library: &'a Library,
+    meshes: f32,
     random: &mut Random,
 ) -> (ObjectSource, Cow<'a, Mesh>) {
     loop {
-        let (object, mesh) = recipe.object(library, random.seed());
+        let (object, mesh) = recipe.object_with(library, random.seed(), meshes);
         match object {
             ObjectSource::Shape { kind, .. } if kind.is_open() => {}
             _ => return (object, mesh),

@@ -11,36 +11,6 @@ use crate::random::Random;
 /// Sets of directions, each turned otherwise: pixels beside each other have different ones.
 const SETS: usize = 16;
 
-/// The response of each pixel of a view to light from all around. All lists run along the covered pixels.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RadianceTransfer {
-    /// Width and height, pixels.
-    pub size: u32,
-    /// The camera over the plate, radians.
-    pub elevation: f32,
-    /// The covered pixels, ascending: row times size plus column.
-    pub pixels: Vec<u32>,
-    /// Unit vectors to the eye, in the viewer's frame.
-    pub towards_eye: Vec<Vec3>,
-    /// Whether what the pixel mirrors is not blocked.
-    pub(super) mirrors: Vec<bool>,
-    /// The blocked part of the cosine, in harmonics of the table's frame.
-    pub(super) blocked: Vec<[f32; COEFFICIENTS]>,
-    /// The irradiance that the object throws back onto the pixel, for an albedo of 1.
-    pub(super) bounced: Vec<[f32; BOUNCE_COEFFICIENTS]>,
-    /// Materials that the surface can have.
-    pub finishes: Vec<TransferFinish>,
-}
-
-/// Albedo and relief of a view.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct TransferFinish {
-    /// Unit normals in the viewer's frame, with relief.
-    pub normals: Vec<Vec3>,
-    /// Linear red, green and blue, 0..=1.
-    pub albedo: Vec<Vec3>,
-}
-
 /// The table's frame of a camera at this elevation, radians: rows are its axes in the viewer's frame.
 pub(super) fn table_frame(elevation: f32) -> Mat3 {
     let (sin, cos) = elevation.sin_cos();
@@ -83,29 +53,6 @@ impl Directions {
             .map(|&towards| harmonics_at(TRANSFER_ORDER, to_table * towards))
             .collect();
         Self { towards, harmonics }
-    }
-}
-
-impl RadianceTransfer {
-    /// Casts `rays` rays a pixel (all around; half of them leave the surface) from what a buffer shows.
-    pub(super) fn cast(
-        buffer: &GBuffer,
-        occluder: &Occluder,
-        elevation: f32,
-        rays: u32,
-        seed: u64,
-    ) -> Self {
-        let cast = cast_pixels(buffer, occluder, table_frame(elevation), rays, seed);
-        Self {
-            size: buffer.size,
-            elevation,
-            pixels: buffer.pixels.clone(),
-            towards_eye: buffer.towards_eye.clone(),
-            mirrors: cast.iter().map(|pixel| pixel.mirrors).collect(),
-            blocked: cast.iter().map(|pixel| pixel.blocked).collect(),
-            bounced: cast.iter().map(|pixel| pixel.bounced).collect(),
-            finishes: Vec::new(),
-        }
     }
 }
 

@@ -16,36 +16,31 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `cast` | the rays of a view |
-//! | `curves` | the Fourier coefficients of a view in a light |
-//! | `rooms` | light to draw from |
-//! | `views` | which objects and poses are drawn |
-//! | `cache` | views on disk |
-//! | `timing` | the table's angle as a rig knows it |
-//! | `drawn` | a view in a random material, environment light and camera |
+//! | `environment_lights` | light to draw from |
 //! | `photo_view` | a view for photographs: what a device needs to light it without a ray |
 //! | `photo_plan` | the material, light and camera of one such photograph |
+//! | `turn_view` | a view of an object on the table, likewise |
+//! | `turn_plan` | the material, light and camera of a turn of one |
+//! | `timing` | the table's angle as a rig knows it |
 
-mod cache;
 mod cast;
-mod curves;
 mod environment_lights;
 mod photo_plan;
 mod photo_view;
 #[cfg(test)]
 mod tests;
 mod timing;
-mod turn_sample;
-mod views;
+mod turn_plan;
+mod turn_view;
 
 use relight_core::light::Order;
 use relight_core::render::cosine_lobe;
 
-pub use cache::TransferCache;
 pub use environment_lights::EnvironmentLights;
 pub use photo_plan::{PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint};
 pub use photo_view::{PhotoView, PhotoViewRecipe, ViewLamp};
-pub use turn_sample::TurnSample;
-pub use views::TransferRecipe;
+pub use turn_plan::{CURVE_TERMS, CurveTerms, TurnMaterial, TurnPlan, terms_of};
+pub use turn_view::{TurnView, TurnViewRecipe};
 
 /// The order of the light: lamps are blurred by it, and gloss as smooth as varnish.
 pub(crate) const TRANSFER_ORDER: Order = Order::LAMP;

@@ -154,6 +154,24 @@ impl ViewGeometry {
         self.occluder
     }
 
+    /// An object on the plate of the table.
+    pub(super) fn on_table(mesh: &Mesh, stand: &TablePose, size: u32) -> Self {
+        let placement = stand.placement(mesh);
+        Self {
+            buffer: GBuffer::render(mesh, placement, stand.projection, size),
+            occluder: Occluder::with_disc(mesh, placement, &stand.plate(mesh)),
+            table: Some(stand.axis()),
+        }
+    }
+
+    pub(super) fn buffer(&self) -> &GBuffer {
+        &self.buffer
+    }
+
+    pub(super) fn occluder(&self) -> &Occluder {
+        &self.occluder
+    }
+
     fn draw(recipe: &Recipe, object: &ObjectSource, mesh: &Mesh, random: &mut Random) -> Self {
         let can_stand = match object {
             ObjectSource::Mesh { .. } => true,
@@ -161,12 +179,7 @@ impl ViewGeometry {
         };
         if can_stand && random.chance(ON_TABLE) {
             let stand = TablePose::draw(random, ELEVATIONS);
-            let placement = stand.placement(mesh);
-            return Self {
-                buffer: GBuffer::render(mesh, placement, stand.projection, recipe.size),
-                occluder: Occluder::with_disc(mesh, placement, &stand.plate(mesh)),
-                table: Some(stand.axis()),
-            };
+            return Self::on_table(mesh, &stand, recipe.size);
         }
         let (pose, projection, buffer) = recipe.framed(object, mesh, random);
         Self {
@@ -205,7 +218,7 @@ impl ViewGeometry {
         })
     }
 
-    fn finish_planes(&self, finish: &Finish, library: &Library) -> Vec<f16> {
+    pub(super) fn finish_planes(&self, finish: &Finish, library: &Library) -> Vec<f16> {
         let material = finish.apply(&self.buffer, library);
         self.dense(PhotoView::FINISH_PLANES, |k, values| {
             write(values, 0, &material.normals[k].to_array());
@@ -219,7 +232,7 @@ impl ViewGeometry {
     }
 
     /// Planes with the values that `of` writes for each covered pixel, 0 elsewhere.
-    fn dense(&self, planes: usize, of: impl Fn(usize, &mut [f32])) -> Vec<f16> {
+    pub(super) fn dense(&self, planes: usize, of: impl Fn(usize, &mut [f32])) -> Vec<f16> {
         let area = (self.buffer.size * self.buffer.size) as usize;
         let mut dense = vec![f16::ZERO; planes * area];
         let mut values = vec![0.0; planes];
@@ -233,6 +246,6 @@ impl ViewGeometry {
     }
 }
 
-fn write(values: &mut [f32], at: usize, part: &[f32]) {
+pub(super) fn write(values: &mut [f32], at: usize, part: &[f32]) {
     values[at..at + part.len()].copy_from_slice(part);
 }

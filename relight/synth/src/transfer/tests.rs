@@ -1,11 +1,11 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use half::f16;
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight, basis};
 
-use super::cast::{RadianceTransfer, TransferFinish};
-use super::curves::{CurveCoefficients, TransferLobe, TransferMaterial};
+use super::photo_view::ViewGeometry;
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::{Folders, Library};
@@ -17,36 +17,84 @@ use crate::mesh::Mesh;
 use crate::shape::ShapeKind;
 use crate::view::{Pose, Projection};
 
-fn recipe() -> TransferRecipe {
-    TransferRecipe {
-        seed: 5,
-        size: 32,
-        rays: 400,
-    }
-}
-
-const MATT: TransferMaterial = TransferMaterial {
+const MATT: TurnMaterial = TurnMaterial {
     is_metal: false,
     reflectance: 0.0,
-    lobe: TransferLobe::Fresnel,
+    is_fresnel: true,
     is_tinted: false,
     blur: 0.2,
     bounce: 0.0,
 };
 
+/// A view of a white object whose pixels have these normals.
+struct Seen {
+    elevation: f32,
+    buffer: GBuffer,
+    base: Vec<f16>,
+}
+
+impl Seen {
+    fn new(buffer: &GBuffer, occluder: Occluder, elevation: f32, rays: u32) -> Self {
+        let seen = ViewGeometry::new(buffer.clone(), occluder, None);
+        Self {
+            elevation,
+            buffer: buffer.clone(),
+            base: turn_view::base(&seen, elevation, (rays, 3)),
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.buffer.len()
+    }
+
+    fn at(&self, plane: usize, k: usize) -> f32 {
+        let area = (self.buffer.size * self.buffer.size) as usize;
+        f32::from(self.base[plane * area + self.buffer.pixels[k] as usize])
+    }
+
+    /// What each pixel shows of a light over a whole turn, by the formulas: irradiance, or with a material highlights.
+    fn curves(&self, material: &TurnMaterial, light: &ShLight) -> Vec<CurveTerms> {
+        let terms = terms_of(light);
+        let to_table = cast::table_frame(self.elevation);
+        let one = |k: usize| {
+            let (normal, eye) = (self.buffer.normals[k], self.buffer.towards_eye[k]);
+            let facing = normal.dot(eye).max(0.0);
+            let is_gloss = material.reflectance > 0.0;
+            let towards = if is_gloss {
+                normal * (2.0 * facing) - eye
+            } else {
+                normal
+            };
+            let harmonics: [f32; COEFFICIENTS] =
+                cast::harmonics_at(TRANSFER_ORDER, to_table * towards.normalize_or(normal));
+            let mut curve = [[0.0; 3]; CURVE_TERMS];
+            for (at, terms) in terms.iter().enumerate() {
+                let l = band(at);
+                let taken = if is_gloss {
+                    let left = (-0.5 * (l * (l + 1)) as f32 * material.blur.powi(2)).exp();
+                    harmonics[at] * left * material.reflectance * facing
+                } else {
+                    harmonics[at] * cosine_band(l) - self.at(TurnView::BLOCKED + at, k)
+                };
+                let pairs = curve
+                    .as_flattened_mut()
+                    .iter_mut()
+                    .zip(terms.as_flattened());
+                pairs.for_each(|(sum, light)| *sum += taken * light);
+            }
+            curve
+        };
+        (0..self.len()).map(one).collect()
+    }
+}
+
 /// A ball far above any plate: nothing blocks its light.
-fn open_ball(elevation: f32) -> RadianceTransfer {
+fn open_ball(elevation: f32) -> Seen {
     let mesh: Mesh = ShapeKind::Sphere.build(0);
     let projection = Projection::Orthographic;
     let placement = Pose::upright(elevation, 0.3, 0.9).place(&mesh, projection);
     let buffer = GBuffer::render(&mesh, placement, projection, 32);
-    let mut transfer =
-        RadianceTransfer::cast(&buffer, &Occluder::new(&mesh, placement), elevation, 200, 3);
-    transfer.finishes = vec![TransferFinish {
-        normals: buffer.normals.clone(),
-        albedo: vec![Vec3::splat(PI); buffer.len()],
-    }];
-    transfer
+    Seen::new(&buffer, Occluder::new(&mesh, placement), elevation, 200)
 }
 
 fn a_room(seed: u64) -> ShLight {
@@ -58,12 +106,12 @@ fn a_room(seed: u64) -> ShLight {
 #[test]
 fn nothing_is_blocked_on_an_open_ball_and_its_curves_are_the_irradiance_of_the_turned_light() {
     let elevation = 0.4_f32;
-    let transfer = open_ball(elevation);
+    let seen = open_ball(elevation);
     let light = a_room(4);
-    let curves = transfer.curves(&transfer.finishes[0], &MATT, &light);
+    let curves = seen.curves(&MATT, &light);
     let to_table = cast::table_frame(elevation);
     for k in (0..curves.len()).step_by(37) {
-        let normal = transfer.finishes[0].normals[k];
+        let normal = seen.buffer.normals[k];
         for step in 0..5 {
             let angle = step as f64 * 1.1;
             // At the table's angle a the light has turned by -a about the axis, or the normal by a.
@@ -89,7 +137,7 @@ fn order_of(coefficient: usize) -> usize {
     coefficient.abs_diff(l * (l + 1))
 }
 
-fn value(curve: &CurveCoefficients, angle: f64, c: usize) -> f64 {
+fn value(curve: &CurveTerms, angle: f64, c: usize) -> f64 {
     let mut sum = f64::from(curve[0][c]);
     for m in 1..=6 {
         let (sin, cos) = (m as f64 * angle).sin_cos();
@@ -99,7 +147,7 @@ fn value(curve: &CurveCoefficients, angle: f64, c: usize) -> f64 {
 }
 
 /// An object on a plate, with parts that shadow others.
-fn standing(size: u32, rays: u32) -> (RadianceTransfer, GBuffer, Occluder) {
+fn standing(size: u32, rays: u32) -> (Seen, GBuffer, Occluder) {
     let mesh: Mesh = ShapeKind::Blend.build(2);
     let elevation = 0.35;
     let projection = Projection::Perspective { distance: 5.0 };
@@ -112,19 +160,16 @@ fn standing(size: u32, rays: u32) -> (RadianceTransfer, GBuffer, Occluder) {
     };
     let buffer = GBuffer::render(&mesh, placement, projection, size);
     let occluder = Occluder::with_disc(&mesh, placement, &plate);
-    let mut transfer = RadianceTransfer::cast(&buffer, &occluder, elevation, rays, 3);
-    transfer.finishes = vec![TransferFinish {
-        normals: buffer.normals.clone(),
-        albedo: vec![Vec3::ONE; buffer.len()],
-    }];
-    (transfer, buffer, occluder)
+    let again = Occluder::with_disc(&mesh, placement, &plate);
+    let seen = Seen::new(&buffer, again, elevation, rays);
+    (seen, buffer, occluder)
 }
 
 #[test]
 fn under_even_light_a_pixel_shows_the_part_of_the_sky_that_it_sees() {
-    let (transfer, buffer, occluder) = standing(24, 600);
-    let even = ShLight::even(TRANSFER_ORDER, [1.0; 3]);
-    let curves = transfer.curves(&transfer.finishes[0], &MATT, &even);
+    let (seen, buffer, occluder) = standing(24, 600);
+    let even = ShLight::even(TRANSFER_ORDER, [1.0 / PI as f64; 3]);
+    let curves = seen.curves(&MATT, &even);
     let mut random = crate::random::Random::new(9);
     for k in (0..buffer.len()).step_by(11) {
         let (normal, from) = (buffer.normals[k], buffer.ray_starts[k]);
@@ -229,7 +274,7 @@ fn soft_room(elevation: f32) -> (Panoramas, ShLight) {
 }
 
 /// By how much mean and harmonics of curves are off rendered ones, and the energy of the latter.
-fn differences(curves: &[CurveCoefficients], rendered: &[[[f32; 3]; 7]]) -> ([f64; 7], [f64; 7]) {
+fn differences(curves: &[CurveTerms], rendered: &[[[f32; 3]; 7]]) -> ([f64; 7], [f64; 7]) {
     let (mut off, mut energy) = ([0.0_f64; 7], [0.0_f64; 7]);
     for (curve, rendered) in curves.iter().zip(rendered) {
         for (term, rendered) in rendered.iter().enumerate() {
@@ -244,14 +289,10 @@ fn differences(curves: &[CurveCoefficients], rendered: &[[[f32; 3]; 7]]) -> ([f6
 
 #[test]
 fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_says() {
-    let (transfer, buffer, occluder) = standing(20, 1500);
-    let axis = Vec3::new(0.0, transfer.elevation.cos(), transfer.elevation.sin());
-    let (panoramas, light) = soft_room(transfer.elevation);
-    let finish = TransferFinish {
-        normals: buffer.normals.clone(),
-        albedo: vec![Vec3::splat(PI); buffer.len()],
-    };
-    let curves = transfer.curves(&finish, &MATT, &light);
+    let (seen, buffer, occluder) = standing(20, 1500);
+    let axis = Vec3::new(0.0, seen.elevation.cos(), seen.elevation.sin());
+    let (panoramas, light) = soft_room(seen.elevation);
+    let curves = seen.curves(&MATT, &light);
     let scene = SyntheticScene::shaded(buffer, occluder, 16, 7);
     let rendered = harmonics_of_frames(&scene, &panoramas, axis, None);
     let (off, energy) = differences(&curves, &rendered);
@@ -270,17 +311,13 @@ fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_say
 #[test]
 fn highlights_of_rendered_frames_are_as_strong_as_the_transfer_says() {
     let elevation = 0.35;
-    let transfer = open_ball(elevation);
+    let seen = open_ball(elevation);
     let mesh: Mesh = ShapeKind::Sphere.build(0);
     let projection = Projection::Orthographic;
     let placement = Pose::upright(elevation, 0.3, 0.9).place(&mesh, projection);
     let buffer = GBuffer::render(&mesh, placement, projection, 32);
     let (panoramas, light) = soft_room(elevation);
     let axis = Vec3::new(0.0, elevation.cos(), elevation.sin());
-    let finish = TransferFinish {
-        normals: buffer.normals.clone(),
-        albedo: vec![Vec3::ZERO; buffer.len()],
-    };
     let scene = SyntheticScene::open(buffer);
     for (reflectance, exponent) in [(0.5, 12.0), (0.8, 40.0)] {
         let gloss = BlinnPhong {
@@ -289,9 +326,9 @@ fn highlights_of_rendered_frames_are_as_strong_as_the_transfer_says() {
         };
         let rendered = harmonics_of_frames(&scene, &panoramas, axis, Some(gloss));
         let material = MATT.with_half_vector(reflectance, exponent);
-        let curves = transfer.curves(&finish, &material, &light);
+        let curves = seen.curves(&material, &light);
         // An albedo of pi stands for a white surface in the transfer.
-        let curves: Vec<CurveCoefficients> = curves
+        let curves: Vec<CurveTerms> = curves
             .into_iter()
             .map(|curve| curve.map(|values| values.map(|value| PI * value)))
             .collect();
@@ -306,33 +343,29 @@ fn highlights_of_rendered_frames_are_as_strong_as_the_transfer_says() {
 }
 
 #[test]
-fn views_are_cast_once_and_a_damaged_one_again() {
+fn a_turn_is_the_same_for_the_same_seed_and_its_numbers_are_in_range() {
     let library = Library::read(&Folders::default()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let cache = TransferCache::open(folder.path(), recipe(), &library).unwrap();
-    let first = cache.view(&library, 0).unwrap();
-    assert_eq!(cache.view(&library, 0).unwrap(), first);
-    let files = || {
-        std::fs::read_dir(folder.path())
-            .unwrap()
-            .map(|e| e.unwrap().path())
+    let recipe = TurnViewRecipe {
+        seed: 3,
+        size: 16,
+        rays: 32,
     };
-    assert_eq!(files().count(), 1);
-    let path = files().next().unwrap();
-    let mut bytes = std::fs::read(&path).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    std::fs::write(&path, &bytes).unwrap();
-    assert_eq!(cache.view(&library, 0).unwrap(), first);
-    let other = TransferRecipe {
-        rays: 300,
-        ..recipe()
-    };
-    TransferCache::open(folder.path(), other, &library)
-        .unwrap()
-        .view(&library, 0)
-        .unwrap();
-    assert_eq!(files().count(), 2);
+    let view = recipe.cast(&library, 5);
+    assert_eq!(view, recipe.cast(&library, 5));
+    assert_eq!(view.base.len(), TurnView::BASE * 256);
+    let finishes = TurnView::FINISHES * TurnView::FINISH_PLANES;
+    assert_eq!(view.finishes.len(), finishes * 256);
+    let made = made_panoramas().unwrap();
+    let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
+    let rooms = EnvironmentLights::new(&panoramas, 2, 1);
+    let plans: Vec<TurnPlan> = (0..200)
+        .map(|seed| TurnPlan::draw(seed, view.elevation, &rooms))
+        .collect();
+    for (seed, plan) in (0..).zip(&plans) {
+        assert_eq!(*plan, TurnPlan::draw(seed, view.elevation, &rooms));
+        assert!(plan.finish < TurnView::FINISHES);
+        assert!((plan.elevation - view.elevation).abs() < 8.1_f32.to_radians());
+    }
 }
 
 #[test]
@@ -375,39 +408,10 @@ fn the_zenith_of_a_panorama_is_along_the_table_s_axis_in_most_rooms_and_its_azim
 }
 
 #[test]
-fn a_mirror_image_has_the_normals_and_curves_of_the_mirrored_object_under_the_mirrored_light() {
-    let transfer = open_ball(0.3);
-    let mut seed = 0;
-    // Two draws that differ in nothing but whether they are mirrored cannot be asked for; the ball is its own mirror
-    // image, so that its mirrored curves have to be those of its own normals.
-    let rooms = {
-        let made = made_panoramas().unwrap();
-        let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
-        EnvironmentLights::new(&panoramas, 1, 1)
-    };
-    let drawn = loop {
-        seed += 1;
-        let drawn = TurnSample::draw(&transfer, &rooms, seed);
-        if drawn.pixels != transfer.pixels || drawn.normals != transfer.finishes[0].normals {
-            break drawn;
-        }
-        assert!(seed < 50);
-    };
-    assert!(drawn.pixels.is_sorted());
-    for (&pixel, normal) in drawn.pixels.iter().zip(&drawn.normals) {
-        let x = ((pixel % 32) as f32 + 0.5) / 16.0 - 1.0;
-        assert!(normal.x * x >= -0.02 && normal.z >= 0.0, "{normal} at {x}");
-    }
-    let half = drawn.halved();
-    assert_eq!(half.size, 16);
-    assert!((half.pixels.len() as f32 * 4.0 / drawn.pixels.len() as f32 - 1.0).abs() < 0.15);
-}
-
-#[test]
 fn the_light_of_rooms_and_lamps_on_a_photograph_is_that_of_rays() {
     let (_, buffer, occluder) = standing(24, 16);
     let table = Vec3::new(0.0, 0.35_f32.cos(), 0.35_f32.sin());
-    let seen = photo_view::ViewGeometry::new(buffer.clone(), occluder, Some(table));
+    let seen = ViewGeometry::new(buffer.clone(), occluder, Some(table));
     let mut random = crate::random::Random::new(6);
     let lamps: Vec<SyntheticLamp> = (0..4).map(|_| seen.lamp(&mut random)).collect();
     let area = 24 * 24;

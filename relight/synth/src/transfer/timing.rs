@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 
 use relight_core::light::NormalEquations;
 
-use super::curves::{CURVE_COEFFICIENTS, CurveCoefficients};
+use super::turn_plan::CURVE_TERMS;
+#[cfg(test)]
+use super::turn_plan::CurveTerms;
 use crate::random::Random;
 
 /// Angles of a turn that are looked at.
@@ -26,7 +28,7 @@ const RIDGE: f64 = 1e-6;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TableTiming {
     /// Row by row: what each true coefficient adds to each that is found.
-    matrix: [[f32; CURVE_COEFFICIENTS]; CURVE_COEFFICIENTS],
+    pub(super) matrix: [[f32; CURVE_TERMS]; CURVE_TERMS],
 }
 
 /// A frame: the stated and the true angle of the table, radians.
@@ -44,10 +46,10 @@ impl TableTiming {
     }
 
     fn from_angles(angles: &[FrameAngle]) -> Option<Self> {
-        let mut matrix = [[0.0; CURVE_COEFFICIENTS]; CURVE_COEFFICIENTS];
+        let mut matrix = [[0.0; CURVE_TERMS]; CURVE_TERMS];
         // The equations take three columns at once.
-        for first in (0..CURVE_COEFFICIENTS).step_by(3) {
-            let mut equations = NormalEquations::new(CURVE_COEFFICIENTS);
+        for first in (0..CURVE_TERMS).step_by(3) {
+            let mut equations = NormalEquations::new(CURVE_TERMS);
             for angle in angles {
                 let shown = terms(angle.is);
                 let values = from_fn(|k| shown.get(first + k).copied().unwrap_or(0.0));
@@ -62,25 +64,12 @@ impl TableTiming {
         }
         Some(Self { matrix })
     }
-
-    /// The coefficients as they are found.
-    pub(super) fn seen(&self, curve: &CurveCoefficients) -> CurveCoefficients {
-        self.matrix.map(|row| {
-            let mut sum = [0.0; 3];
-            for (part, values) in row.iter().zip(curve) {
-                for (sum, value) in sum.iter_mut().zip(values) {
-                    *sum += part * value;
-                }
-            }
-            sum
-        })
-    }
 }
 
 /// `1, cos a, -sin a, cos 2a, -sin 2a` and so on.
-fn terms(angle: f64) -> [f64; CURVE_COEFFICIENTS] {
-    let mut terms = [1.0; CURVE_COEFFICIENTS];
-    for m in 1..=CURVE_COEFFICIENTS / 2 {
+fn terms(angle: f64) -> [f64; CURVE_TERMS] {
+    let mut terms = [1.0; CURVE_TERMS];
+    for m in 1..=CURVE_TERMS / 2 {
         let (sin, cos) = (m as f64 * angle).sin_cos();
         terms[2 * m - 1] = cos;
         terms[2 * m] = -sin;
@@ -126,11 +115,26 @@ fn frame_angles(random: &mut Random) -> Vec<FrameAngle> {
 mod tests {
     use super::*;
 
-    fn curve() -> CurveCoefficients {
+    impl TableTiming {
+        /// The coefficients as they are found.
+        fn seen(&self, curve: &CurveTerms) -> CurveTerms {
+            self.matrix.map(|row| {
+                let mut sum = [0.0; 3];
+                for (part, values) in row.iter().zip(curve) {
+                    for (sum, value) in sum.iter_mut().zip(values) {
+                        *sum += part * value;
+                    }
+                }
+                sum
+            })
+        }
+    }
+
+    fn curve() -> CurveTerms {
         from_fn(|k| from_fn(|c| 1.0 / (1 + k + c) as f32))
     }
 
-    fn largest_difference(a: &CurveCoefficients, b: &CurveCoefficients) -> f32 {
+    fn largest_difference(a: &CurveTerms, b: &CurveTerms) -> f32 {
         let pairs = a.as_flattened().iter().zip(b.as_flattened());
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
     }
@@ -162,7 +166,7 @@ mod tests {
         let before = curve();
         let seen = TableTiming::from_angles(&angles).unwrap().seen(&before);
         let mut expected = before;
-        for m in 1..=CURVE_COEFFICIENTS / 2 {
+        for m in 1..=CURVE_TERMS / 2 {
             let (sin, cos) = (m as f32 * off as f32).sin_cos();
             for c in 0..3 {
                 let (re, im) = (before[2 * m - 1][c], before[2 * m][c]);

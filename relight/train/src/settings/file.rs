@@ -9,11 +9,7 @@ use serde::de::DeserializeOwned;
 use crate::error::TrainError;
 
 /// Settings that a resumed run may change: they do not affect what it learns.
-const CHANGEABLE: [&str; 3] = [
-    "run.log_every",
-    "run.checkpoint_minutes",
-    "data.view_folder",
-];
+const CHANGEABLE: [&str; 2] = ["run.log_every", "run.checkpoint_minutes"];
 
 /// Reads settings from a TOML file; missing keys have their defaults, and unknown keys are errors.
 ///

@@ -64,7 +64,8 @@ impl TurnNetworkSettings {
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
-        self.data.check()
+        self.data.check()?;
+        self.data.check_batch(self.run.batch)
     }
 }
 

@@ -64,8 +64,6 @@ fn the_setting_that_differs_is_named() {
     let often = whole.replace("log_every = 20\n", "log_every = 5\n");
     assert_ne!(often, whole);
     assert_eq!(first_difference(&own, &often), None);
-    let turn = TurnNetworkSettings::default();
-    assert_eq!(first_difference(&turn, "[data]\nview_folder = \"v\""), None);
     let unknown = "[run]\nspeed = 3";
     assert!(first_difference(&own, unknown).unwrap().contains("speed"));
 }

@@ -15,22 +15,17 @@ const MAX_VIEWS: u64 = 1_000_000;
 pub struct TransferSettings {
     /// Width and height, a multiple of 32.
     pub size: u32,
-    /// The number of views; each is cast once.
+    /// Views from which each step draws, at most.
     pub views: u64,
-    /// The folder in which views are kept; runs can share it. Default: `views` in the folder of the run.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub view_folder: Option<PathBuf>,
     /// Views that exist from the first step on.
     pub first_views: u64,
-    /// Views that join at each step, until all have.
+    /// New views cast at each step; once there are `views`, in place of the oldest.
     pub new_views: u64,
     /// Rays a pixel.
     pub rays: u32,
-    /// Part of the steps, 0..=1, in which views are seen at half the width: four times as many fit into a second.
-    pub coarse_part: f64,
     /// Curves of brightness of each panorama.
     pub variants: u32,
-    /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
+    /// A folder of meshes, or a packed library, of which the validation part is not learned from, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
     /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
@@ -40,7 +35,7 @@ pub struct TransferSettings {
     /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_panoramas: Option<PathBuf>,
-    /// Validation turns, of procedural shapes that are not used in training.
+    /// Validation turns, of shapes that are not used in training.
     pub validation: u64,
 }
 
@@ -48,12 +43,10 @@ impl Default for TransferSettings {
     fn default() -> Self {
         Self {
             size: 128,
-            views: 3000,
-            view_folder: None,
+            views: 768,
             first_views: 64,
-            new_views: 2,
+            new_views: 1,
             rays: 144,
-            coarse_part: 0.6,
             variants: 8,
             meshes: None,
             panoramas: None,
@@ -77,17 +70,24 @@ impl TransferSettings {
             "a multiple of 32 up to 512",
         )?;
         within("data.views", self.views, 1..=MAX_VIEWS)?;
-        within("data.first_views", self.first_views, 1..=MAX_VIEWS)?;
+        within("data.first_views", self.first_views, 1..=self.views)?;
         within("data.validation", self.validation, 1..=MAX_VIEWS)?;
         within("data.new_views", self.new_views, 0..=MAX_VIEWS)?;
         within("data.rays", self.rays, 16..=4096)?;
-        within("data.coarse_part", self.coarse_part, 0.0..=1.0)?;
         within("data.variants", self.variants, 1..=1000)
     }
 
-    /// How many of the views there are at a step.
-    pub fn views_at(&self, step: u64) -> u64 {
+    /// Whether batches of this size can be drawn: the samples of one are of different views.
+    pub(crate) fn check_batch(&self, batch: u64) -> Result<(), TrainError> {
+        let needed = format!("at least run.batch, {batch}");
+        let views = self.first_views;
+        ensure(views >= batch, "data.first_views", views, &needed)
+    }
+
+    /// The views that a step draws from, by their numbers: the oldest, and the first that is not one of them.
+    pub(crate) fn views_at(&self, step: u64) -> (u64, u64) {
         let joined = self.new_views.saturating_mul(step);
-        self.first_views.saturating_add(joined).clamp(1, self.views)
+        let end = self.first_views.saturating_add(joined);
+        (end.saturating_sub(self.views), end)
     }
 }

@@ -1,10 +1,8 @@
 //! The run that trains the network of whole turns.
 
-use std::path::Path;
-
 use tch::{Kind, Tensor, no_grad};
 
-use crate::data::synthetic_turns::{TurnBatch, TurnViews};
+use crate::data::turns::{TurnBatch, TurnDraw, Turns};
 use crate::distributed::process_group::{ProcessGroup, indivisible};
 use crate::engine::losses::{Mean, angular_degrees, chord};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
@@ -12,9 +10,8 @@ use crate::engine::terms::LossTerms;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{TurnNetworkSettings, first_difference};
-use relight_core::reader::Rank;
 use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
-use relight_synth::{SkippedFile, TurnSample, stream};
+use relight_synth::{SkippedFile, stream};
 
 /// The loss coefficient of the expected error; that of the normals is 1.
 const EXPECTED_ERROR: f64 = 0.05;
@@ -23,7 +20,7 @@ const ALBEDO: f64 = 0.5;
 /// Range of the logarithm of the expected chord while training.
 const LOG_CHORD: (f64, f64) = (-4.0, 1.0);
 /// Turns of a batch of validation.
-const VALIDATION_BATCH: usize = 8;
+const VALIDATION_BATCH: u64 = 8;
 /// Expected errors for which validation counts the pixels within them, degrees.
 const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
 
@@ -31,53 +28,53 @@ const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
 #[derive(Debug)]
 pub struct TurnNetworkTask {
     settings: TurnNetworkSettings,
-    resources: Resources,
     trainable: Trainable,
-    training: TurnViews,
-    validation: TurnViews,
-    rank: Rank,
+    training: Turns,
+    validation: Turns,
+    /// The batches of validation, made once.
+    validated: Vec<TurnBatch>,
 }
 
 impl TurnNetworkTask {
-    /// Begins with `weights`, or with random ones. Views are kept in `views`, a folder.
+    /// Begins with `weights`, or with random ones.
     ///
     /// # Errors
     /// Settings out of range, files that cannot be read, weights that do not fit.
     pub fn new(
         settings: TurnNetworkSettings,
-        views: &Path,
         resources: Resources,
         weights: Option<&Weights>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
         let graph = turn_network();
         let trainable = Trainable::new(graph, weights, &settings.run, resources.device)?;
+        let data = &settings.data;
         Ok(Self {
-            training: TurnViews::for_training(&settings.data, views, settings.run.seed)?,
-            validation: TurnViews::for_validation(&settings.data, views)?,
+            training: Turns::for_training(data, settings.run.seed, resources.clone())?,
+            validation: Turns::for_validation(data, resources)?,
             settings,
-            resources,
             trainable,
-            rank: Rank::ONLY,
+            validated: Vec::new(),
         })
     }
 
-    /// The views and seeds of this process's part of a step.
-    fn turns_of(&self, step: u64) -> Vec<(u64, u64)> {
-        let seed = stream(stream(self.settings.run.seed, 43), step);
-        let views = self.settings.data.views_at(step);
-        let processes = u64::from(self.rank.world_size());
-        (0..self.settings.run.batch)
-            .filter(|number| number % processes == u64::from(self.rank.index()))
-            .map(|number| {
-                let seed = stream(seed, number);
-                (stream(seed, 0) % views, seed)
-            })
-            .collect()
-    }
-
-    fn is_coarse(&self, step: u64) -> bool {
-        (step as f64) < self.settings.data.coarse_part * self.settings.run.steps as f64
+    /// The batches of validation: each view once, in a material and light of its own.
+    fn make_validation(&mut self) -> Result<(), TrainError> {
+        let count = self.settings.data.validation;
+        let mut begin = self.validated.len() as u64 * VALIDATION_BATCH;
+        while begin < count {
+            let end = count.min(begin + VALIDATION_BATCH);
+            let draw = TurnDraw {
+                oldest: begin,
+                end,
+                batch: end - begin,
+                seed: stream(44, begin),
+            };
+            let batch = self.validation.batch(draw, count)?;
+            self.validated.push(batch);
+            begin = end;
+        }
+        Ok(())
     }
 }
 
@@ -152,10 +149,6 @@ impl TrainingTask for TurnNetworkTask {
         first_difference(&self.settings, other)
     }
 
-    fn inputs(&self) -> Result<String, TrainError> {
-        Ok(format!("turns of recipe {}\n", TurnSample::RECIPE))
-    }
-
     fn left_out(&self) -> &[SkippedFile] {
         self.training.left_out()
     }
@@ -174,15 +167,20 @@ impl TrainingTask for TurnNetworkTask {
                 "a multiple of their number",
             ));
         }
-        self.rank = rank;
+        self.training.set_rank(rank);
         Ok(())
     }
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
-        let place = (Kind::Float, self.resources.device);
-        let batch = self
-            .training
-            .batch(&self.turns_of(step), self.is_coarse(step), place)?;
+        let (run, data) = (&self.settings.run, &self.settings.data);
+        let (oldest, end) = data.views_at(step);
+        let draw = TurnDraw {
+            oldest,
+            end,
+            batch: run.batch,
+            seed: stream(stream(run.seed, 43), step),
+        };
+        let batch = self.training.batch(draw, data.views)?;
         let output = self.trainable.model.forward(&batch.input)?;
         let (normals, log_chord) = predicted_normals(&output[0])?;
         let mut terms = LossTerms::default();
@@ -202,18 +200,15 @@ impl TrainingTask for TurnNetworkTask {
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
+        self.make_validation()?;
         let model = self.trainable.average();
         let mut summary = ValidationSummary::default();
-        let count = self.settings.data.validation;
-        let turns: Vec<(u64, u64)> = (0..count).map(|k| (k, stream(44, k))).collect();
-        for turns in turns.chunks(VALIDATION_BATCH) {
-            let place = (Kind::Float, self.resources.device);
-            let batch = self.validation.batch(turns, false, place)?;
+        for batch in &self.validated {
             no_grad(|| {
                 let output = model.forward(&batch.input)?;
                 let (normals, log_chord) = predicted_normals(&output[0])?;
-                summary.add(&batch, &normals, &log_chord)?;
-                summary.add_albedo(&batch, &output[1])
+                summary.add(batch, &normals, &log_chord)?;
+                summary.add_albedo(batch, &output[1])
             })?;
         }
         Ok(Validation {

@@ -4,59 +4,14 @@
 //! are divided by the curve's mean, by their effective value over the object, and turned by the phase of the light, which
 //! is read from the curves themselves.
 
-use std::f32::consts::TAU;
-
+use crate::network::limits::{
+    COLOURED, DARK, HARMONICS, MAX_LOG, MAX_RATIO, MAX_VALUE, MIN_MEAN, STRONG,
+};
 use num_complex::Complex32;
 use relight_photo::nets::{LOG_MEANS, TURN_INPUTS};
-use serde::Serialize;
 
-/// Harmonics that the network sees in all channels.
-const COLOURED: usize = 4;
-/// Harmonics that it sees.
-const HARMONICS: usize = 6;
-/// Harmonics that it also sees undivided, with their mean.
-const STRONG: usize = 2;
 /// Terms of a curve.
 const TERMS: usize = 2 * HARMONICS + 1;
-
-/// Least mean of a curve, in means over the object. By hand: below, harmonics are noise.
-const MIN_MEAN: f32 = 0.002;
-/// Largest harmonic, in means of the curve. Derived: of non-negative light it is at most 2.
-const MAX_RATIO: f32 = 1.5;
-/// Largest harmonic, in effective values over the object. By hand.
-const MAX_VALUE: f32 = 4.0;
-/// Pixels darker than this, in means over the object, count less for the phase of the light. By hand.
-const DARK: f32 = 0.1;
-/// Largest logarithm of a mean beside that of all. By hand.
-const MAX_LOG: f32 = 3.0;
-
-/// The assumed rotation of the environment light. The phase of the first harmonic gives it, if that is strong; in an environment
-/// that is bright on two opposite sides, that of the second gives it, up to half a turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PhaseHypothesis {
-    /// By the first harmonic.
-    First,
-    /// By the second harmonic.
-    Second,
-    /// By the second harmonic, half a turn further.
-    SecondOpposite,
-}
-
-impl PhaseHypothesis {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::SecondOpposite];
-
-    /// The same of the mirror image, left and right, in which a phase has the other sign, and half a turn more where the
-    /// harmonic is odd.
-    pub(crate) const fn in_mirror(self) -> Self {
-        match self {
-            Self::First => Self::First,
-            Self::Second => Self::SecondOpposite,
-            Self::SecondOpposite => Self::Second,
-        }
-    }
-}
 
 /// A turn for the network: a square crop around the object.
 #[derive(Debug, Clone, Copy)]
@@ -81,9 +36,9 @@ fn up_to(value: Complex32, most: f32) -> Complex32 {
 }
 
 /// The planes of the network, [`TURN_INPUTS`] of side x side values, 0 outside the object.
-pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32> {
+pub fn network_input(turn: &NetworkTurn<'_>) -> Vec<f32> {
     let ratios = Ratios::new(turn);
-    let turned = ratios.turned(ratios.phase(phase));
+    let turned = ratios.turned(ratios.phase());
     let mut planes = PlaneWriter::new(turn);
     let mut whole = Vec::new();
     for (m, harmonic) in turned.iter().enumerate() {
@@ -192,9 +147,9 @@ impl Ratios {
         Self { means, harmonics }
     }
 
-    /// The phase of a harmonic over the object, radians.
-    fn phase_of(&self, m: usize) -> f32 {
-        let weighted = self.harmonics[m]
+    /// The phase of the first harmonic over the object, radians.
+    fn phase(&self) -> f32 {
+        let weighted = self.harmonics[0]
             .iter()
             .zip(&self.means)
             .map(|(harmonic, mean)| {
@@ -205,14 +160,6 @@ impl Ratios {
             });
         let sum = weighted.fold(Complex32::default(), |sum, one| sum + one);
         sum.im.atan2(sum.re)
-    }
-
-    fn phase(&self, hypothesis: PhaseHypothesis) -> f32 {
-        match hypothesis {
-            PhaseHypothesis::First => self.phase_of(0),
-            PhaseHypothesis::Second => self.phase_of(1) / 2.0,
-            PhaseHypothesis::SecondOpposite => self.phase_of(1) / 2.0 + TAU / 2.0,
-        }
     }
 
     /// The harmonics with the environment light rotated back by this phase.
@@ -285,14 +232,14 @@ mod tests {
         (pixels, curves)
     }
 
-    fn input(pixels: &[u32], curves: &[[[f32; 3]; TERMS]], phase: PhaseHypothesis) -> Vec<f32> {
+    fn input(pixels: &[u32], curves: &[[[f32; 3]; TERMS]]) -> Vec<f32> {
         let turn = NetworkTurn {
             side: SIDE,
             pixels,
             curves,
             elevation: 0.3,
         };
-        network_input(&turn, phase)
+        network_input(&turn)
     }
 
     /// The largest difference of two inputs.
@@ -306,7 +253,7 @@ mod tests {
     #[test]
     fn it_has_as_many_planes_as_the_network_wants_and_nothing_outside_the_object() {
         let (pixels, curves) = curves();
-        let planes = input(&pixels, &curves, PhaseHypothesis::First);
+        let planes = input(&pixels, &curves);
         assert_eq!(planes.len(), TURN_INPUTS * SIDE * SIDE);
         for plane in planes.chunks(SIDE * SIDE) {
             assert!(
@@ -335,16 +282,7 @@ mod tests {
                 .iter_mut()
                 .for_each(|value| *value *= 7.0);
         }
-        let (before, after) = (
-            input(&pixels, &curves, PhaseHypothesis::First),
-            input(&pixels, &other, PhaseHypothesis::First),
-        );
+        let (before, after) = (input(&pixels, &curves), input(&pixels, &other));
         assert!(difference(&before, &after) < 1e-3);
-        // By the second harmonic the two hypotheses may change places.
-        let second = |curves| input(&pixels, curves, PhaseHypothesis::Second);
-        let opposite = input(&pixels, &other, PhaseHypothesis::SecondOpposite);
-        let nearest = difference(&second(&curves), &second(&other))
-            .min(difference(&second(&curves), &opposite));
-        assert!(nearest < 1e-3, "{nearest}");
     }
 }

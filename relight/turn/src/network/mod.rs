@@ -3,9 +3,10 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `crop` | the curves on the grid that the network is given, and back |
-//! | `input` | the harmonics of the curves as the network's planes |
-//! | `predict` | both together, in several hypotheses of the light's phase |
+//! | `input`, `limits` | the harmonics of the curves as the network's planes |
+//! | `predict` | both together |
 
 pub(crate) mod crop;
 pub(crate) mod input;
+pub mod limits;
 pub(crate) mod predict;

@@ -1,17 +1,17 @@
 //! Cameras on the device: exposure, blur, noise, response, eight bits and JPEG, `batch x 3 x side x side`.
 
-use tch::{Device, Kind, Tensor};
+use tch::{Kind, Tensor};
 
-use super::lit::{PlannedPhoto, columns, indices, upload};
+use super::lit::PlannedPhoto;
+use crate::data::noise::NoiseTiles;
+use crate::data::tensors::{columns, indices, upload};
 use crate::error::TrainError;
-use relight_synth::{PhotoCamera, stream};
+use relight_synth::PhotoCamera;
 
 /// Part of the pixels that are darker than what a picture is exposed by.
 const EXPOSED: f64 = 0.99;
 /// By every so manieth row and column it is found.
 const STEP: i64 = 2;
-/// Tiles of noise: each photograph has one of them.
-const TILES: usize = 32;
 /// Pixels to each side of a blur's middle.
 const REACH: i64 = 2;
 /// sRGB (IEC 61966-2-1): where the power begins, in light and in values, and its numbers.
@@ -21,10 +21,6 @@ const LINEAR_SLOPE: f64 = 12.92;
 const OFFSET: f64 = 0.055;
 const POWER: f64 = 2.4;
 
-/// Noise of standard deviation 1 that cameras draw from.
-#[derive(Debug)]
-pub(super) struct NoiseTiles(Tensor);
-
 /// From light to camera values.
 #[derive(Debug)]
 pub(super) struct SimulatedPhotos {
@@ -32,32 +28,6 @@ pub(super) struct SimulatedPhotos {
     pub(super) picture: Tensor,
     /// By which all light was multiplied, `batch x 3 x 1 x 1`.
     pub(super) gain: Tensor,
-}
-
-impl NoiseTiles {
-    pub(super) fn new(side: i64, seed: u64, device: Device) -> Result<Self, TrainError> {
-        let count = TILES * 3 * (side * side) as usize;
-        let values: Vec<half::f16> = (0..count as u64)
-            .map(|at| half::f16::from_f32(normal_of(stream(seed, at))))
-            .collect();
-        let tiles = Tensor::f_from_slice(&values)?
-            .f_reshape([TILES as i64, 3, side, side])?
-            .f_to_device(device)?;
-        Ok(Self(tiles))
-    }
-
-    /// One tile for each seed.
-    fn of(&self, seeds: &[u64], kind: Kind) -> Result<Tensor, TrainError> {
-        let device = self.0.device();
-        let chosen = indices(seeds.iter().map(|seed| *seed as usize % TILES), device)?;
-        Ok(self.0.f_index_select(0, &chosen)?.f_to_kind(kind)?)
-    }
-}
-
-/// Nearly normally distributed, mean 0, standard deviation 1: the sum of four even numbers, each of the variance 1 / 12.
-fn normal_of(hash: u64) -> f32 {
-    let parts = [0, 16, 32, 48].map(|shift| (hash >> shift & 0xffff) as f32 / 65_535.0);
-    (parts.iter().sum::<f32>() - 2.0) * 3.0_f32.sqrt()
 }
 
 /// Photographs light (`image`) on the object (`mask`); `seeds` draw the noise.
@@ -265,7 +235,7 @@ mod tests {
         let image = Tensor::from_slice(&ramp)
             .reshape([1, 1, 64, 64])
             .repeat([1, 3, 1, 1]);
-        let all = Tensor::ones([1, 1, 64, 64], (Kind::Float, Device::Cpu));
+        let all = Tensor::ones([1, 1, 64, 64], (Kind::Float, tch::Device::Cpu));
         let found = |mask: &Tensor| {
             percentile(&image, mask)
                 .unwrap()
@@ -278,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_noise_has_no_bias_and_the_deviation_of_the_camera() {
-        let tiles = NoiseTiles::new(64, 3, Device::Cpu).unwrap();
+        let tiles = NoiseTiles::new((3, 64), 3, tch::Device::Cpu).unwrap();
         let noise = tiles.of(&[5, 9], Kind::Float).unwrap();
         assert!(noise.mean(Kind::Float).double_value(&[]).abs() < 0.02);
         assert!((noise.std(true).double_value(&[]) - 1.0).abs() < 0.02);

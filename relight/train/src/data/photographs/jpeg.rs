@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use tch::Tensor;
 
-use super::lit::{columns, upload};
+use crate::data::tensors::{columns, upload};
 use crate::error::TrainError;
 use relight_synth::PhotoCamera;
 

@@ -7,44 +7,25 @@
 //! ```
 //!
 //! E is the irradiance of the room on an open surface (Ramamoorthi and Hanrahan 2001), L the room, v the visible part of a lamp.
-//! Smooth functions of a direction are drawn into small maps once a photograph, and looked up at each pixel.
 
-use std::f64::consts::PI;
-
-use relight_core::light::{Direction, Order, basis};
-use relight_core::render::cosine_lobe;
 use relight_synth::{PhotoPlan, PhotoView};
-use tch::{Device, Kind, Tensor};
+use tch::Tensor;
 
 use super::view_pool::ViewPool;
+use crate::data::direction_maps::DirectionMaps;
+use crate::data::tensors::{columns, dot, indices, of_light, unit, upload};
 use crate::error::TrainError;
 
-/// Rows of a map of directions, from +y to -y; columns go once around, the first and the last are the same.
-const ROWS: usize = 25;
-const COLUMNS: usize = 49;
 /// Albedo is kept in this range.
 const ALBEDO: (f64, f64) = (0.01, 0.95);
 /// How sharp the edges of a print are.
 const PRINT_EDGE: f64 = 15.0;
-/// Bilinear interpolation, and the border's values beyond the border, as `grid_sampler` counts them.
-const BILINEAR: i64 = 0;
-const BORDER: i64 = 1;
 
 /// A photograph to be made: the view's place in the pool, and all other parameters.
 #[derive(Debug, Clone)]
 pub(super) struct PlannedPhoto {
     pub(super) place: usize,
     pub(super) plan: PhotoPlan,
-}
-
-/// Harmonics on a map of directions.
-#[derive(Debug)]
-pub(super) struct DirectionMaps {
-    /// `directions x coefficients`.
-    radiance: Tensor,
-    /// The same after the cosine's lobe.
-    irradiance: Tensor,
-    bands: Vec<f64>,
 }
 
 /// A batch in its light.
@@ -60,81 +41,6 @@ pub(super) struct LitBatch {
     pub(super) shading: Tensor,
     /// Highlight.
     pub(super) highlight: Tensor,
-}
-
-impl DirectionMaps {
-    pub(super) fn new(kind: Kind, device: Device) -> Result<Self, TrainError> {
-        let order = PhotoView::ORDER;
-        let lobes: Vec<f64> = (0..order.coefficients())
-            .map(|at| cosine_lobe(at.isqrt()))
-            .collect();
-        let harmonics: Vec<f64> = (0..ROWS * COLUMNS)
-            .flat_map(|at| harmonics_at(order, at / COLUMNS, at % COLUMNS))
-            .collect();
-        let radiance = Tensor::f_from_slice(&harmonics)?
-            .f_reshape([(ROWS * COLUMNS) as i64, lobes.len() as i64])?;
-        let irradiance = radiance.f_mul(&Tensor::f_from_slice(&lobes)?)?;
-        let place = |of: Tensor| of.f_to_kind(kind)?.f_to_device(device);
-        Ok(Self {
-            radiance: place(radiance)?,
-            irradiance: place(irradiance)?,
-            bands: (0..lobes.len()).map(|at| at.isqrt() as f64).collect(),
-        })
-    }
-
-    /// The irradiance of lights (`batch x coefficients x 3`) on surfaces of these unit normals.
-    fn irradiance(&self, lights: &Tensor, normals: &Tensor) -> Result<Tensor, TrainError> {
-        look_up(&self.irradiance.f_matmul(lights)?, normals)
-    }
-
-    /// The radiance of lights from these directions, each light blurred by a Gaussian on the sphere of a standard deviation in
-    /// radians.
-    fn radiance(
-        &self,
-        lights: &Tensor,
-        towards: &Tensor,
-        blurs: &[f32],
-    ) -> Result<Tensor, TrainError> {
-        let left: Vec<f32> = blurs
-            .iter()
-            .flat_map(|&blur| {
-                let square = f64::from(blur * blur);
-                let left = move |&l: &f64| (-0.5 * l * (l + 1.0) * square).exp() as f32;
-                self.bands.iter().map(left)
-            })
-            .collect();
-        let shape = [blurs.len() as i64, self.bands.len() as i64, 1];
-        let left = upload(&left, &shape, lights)?;
-        look_up(&self.radiance.f_matmul(&lights.f_mul(&left)?)?, towards)
-    }
-}
-
-/// The harmonics at a cell of a map.
-fn harmonics_at(order: Order, row: usize, column: usize) -> Vec<f64> {
-    let polar = PI * row as f64 / (ROWS - 1) as f64;
-    let around = PI * (2.0 * column as f64 / (COLUMNS - 1) as f64 - 1.0);
-    let [x, y, z] = [
-        polar.sin() * around.sin(),
-        polar.cos(),
-        polar.sin() * around.cos(),
-    ];
-    Direction::new(x, y, z).map_or_else(Vec::new, |at| basis(order, at))
-}
-
-/// Values of maps (`batch x directions x 3`) at unit vectors (`batch x 3 x side x side`).
-fn look_up(maps: &Tensor, at: &Tensor) -> Result<Tensor, TrainError> {
-    let maps = maps
-        .f_transpose(1, 2)?
-        .f_reshape([-1, 3, ROWS as i64, COLUMNS as i64])?;
-    let axis = |axis: i64| at.f_select(1, axis);
-    let row = axis(1)?
-        .f_clamp(-1.0, 1.0)?
-        .f_acos()?
-        .f_mul_scalar(2.0 / PI)?
-        .f_add_scalar(-1.0)?;
-    let column = axis(0)?.f_atan2(&axis(2)?)?.f_mul_scalar(1.0 / PI)?;
-    let grid = Tensor::f_stack(&[column, row], -1)?;
-    Ok(maps.f_grid_sampler(&grid, BILINEAR, BORDER, true)?)
 }
 
 impl LitBatch {
@@ -397,16 +303,6 @@ fn recoloured(photos: &[PlannedPhoto], albedo: &Tensor) -> Result<Tensor, TrainE
     Ok(plain.f_where_self(&is_plain, &mixed)?)
 }
 
-/// `Σ_lm transfer_lm L_lm`: lights `batch x coefficients x 3`, transfer `batch x coefficients x side x side`.
-fn of_light(lights: &Tensor, transfer: &Tensor) -> Result<Tensor, TrainError> {
-    let size = transfer.size();
-    let flat = transfer.f_reshape([size[0], size[1], -1])?;
-    Ok(lights
-        .f_transpose(1, 2)?
-        .f_bmm(&flat)?
-        .f_reshape([size[0], 3, size[2], size[3]])?)
-}
-
 /// Lights as `batch x coefficients x 3`.
 fn lights<'a>(
     photos: &'a [PlannedPhoto],
@@ -420,42 +316,13 @@ fn lights<'a>(
     upload(&values, &[photos.len() as i64, -1, 3], like)
 }
 
-/// Numbers of each of `count` photographs, as `count x numbers x 1 x 1`, on the device and of the kind of another tensor.
-pub(super) fn columns(values: &[f32], count: usize, like: &Tensor) -> Result<Tensor, TrainError> {
-    upload(values, &[count as i64, -1, 1, 1], like)
-}
-
-/// Numbers as a tensor on the device and of the kind of another one.
-pub(super) fn upload(values: &[f32], shape: &[i64], like: &Tensor) -> Result<Tensor, TrainError> {
-    Ok(Tensor::f_from_slice(values)?
-        .f_reshape(shape)?
-        .f_to_device(like.device())?
-        .f_to_kind(like.kind())?)
-}
-
-/// Indices as a tensor.
-pub(super) fn indices(
-    of: impl Iterator<Item = usize>,
-    device: Device,
-) -> Result<Tensor, TrainError> {
-    let of: Vec<i64> = of.map(|at| at as i64).collect();
-    Ok(Tensor::f_from_slice(&of)?.f_to_device(device)?)
-}
-
-/// Dot products over the channels.
-fn dot(a: &Tensor, b: &Tensor) -> Result<Tensor, TrainError> {
-    Ok(a.f_mul(b)?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?)
-}
-
-/// Vectors at length 1.
-fn unit(of: &Tensor) -> Result<Tensor, TrainError> {
-    Ok(of.f_mul(&dot(of, of)?.f_clamp_min(1e-12)?.f_rsqrt()?)?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use relight_core::light::{Direction, basis};
+    use relight_core::render::cosine_lobe;
+    use tch::{Device, Kind};
+
     use relight_synth::{EnvironmentLights, Folders, Library, PhotoViewRecipe, made_panoramas};
 
     const SIZE: usize = 32;
@@ -553,7 +420,7 @@ mod tests {
         for photo in &mut photos {
             photo.plan.bounce = [0.0; 3];
         }
-        let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
+        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu)).unwrap();
         let lit = LitBatch::new(&pool, &maps, &photos).unwrap();
         let (mut off, mut sum) = ([0.0; 2], [0.0; 2]);
         for (at, photo) in photos.iter().enumerate() {
@@ -584,7 +451,7 @@ mod tests {
     #[test]
     fn a_photograph_is_lit_alike_whatever_else_is_in_its_batch() {
         let (pool, photos, _) = photographs();
-        let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
+        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu)).unwrap();
         let all = LitBatch::new(&pool, &maps, &photos).unwrap();
         for (at, photo) in photos.iter().enumerate() {
             let one = LitBatch::new(&pool, &maps, std::slice::from_ref(photo)).unwrap();
@@ -601,7 +468,7 @@ mod tests {
     #[test]
     fn light_that_bounces_makes_hollows_brighter_and_nothing_darker() {
         let (pool, mut photos, _) = photographs();
-        let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
+        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu)).unwrap();
         let shading =
             |photos: &[PlannedPhoto]| LitBatch::new(&pool, &maps, photos).unwrap().shading;
         photos

@@ -2,21 +2,17 @@
 //!
 //! | file | concern |
 //! | --- | --- |
-//! | `view_loader` | threads that cast views |
 //! | `view_pool` | the views of a step, on the device |
 //! | `lit` | views in a light |
 //! | `camera`, `jpeg` | from light to camera values |
 //! | `truth` | the network's input, and its ground truth |
 //!
-//! A batch is a function of the settings and its step, whatever the number of threads and processes. Sample i of each batch
-//! is of a view whose number is i modulo the batch: where several processes share the batches, each casts the views of its
-//! samples only.
+//! A batch is a function of the settings and its step, whatever the number of threads and processes.
 
 mod camera;
 mod jpeg;
 mod lit;
 mod truth;
-mod view_loader;
 mod view_pool;
 
 use std::sync::Arc;
@@ -24,12 +20,15 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use tch::{Kind, no_grad};
 
-use self::camera::{NoiseTiles, photograph};
-use self::lit::{DirectionMaps, LitBatch, PlannedPhoto};
-use self::view_loader::{ViewLoader, ViewSource};
+use self::camera::photograph;
+use self::lit::{LitBatch, PlannedPhoto};
 use self::view_pool::ViewPool;
+use super::direction_maps::DirectionMaps;
+use super::noise::NoiseTiles;
 use super::sample::TruthBatch;
 use super::symmetry::Symmetry;
+use super::view_loader::{Cast, ViewLoader};
+use super::view_ring::ViewWindow;
 use crate::distributed::process_group::indivisible;
 use crate::engine::task::Resources;
 use crate::error::TrainError;
@@ -37,13 +36,14 @@ use crate::settings::{DataSettings, RunSettings};
 use relight_core::light::Panorama;
 use relight_core::reader::Rank;
 use relight_synth::{
-    EnvironmentLights, Folders, Library, PhotoPlan, PhotoViewRecipe, SkippedFile, stream,
+    EnvironmentLights, Folders, Library, PhotoPlan, PhotoView, PhotoViewRecipe, SkippedFile, stream,
 };
 
 /// The batches of a run, lit while it trains.
 #[derive(Debug)]
 pub struct Photographs {
-    source: Arc<ViewSource>,
+    library: Arc<Library>,
+    recipe: PhotoViewRecipe,
     rooms: EnvironmentLights,
     data: DataSettings,
     batch: u64,
@@ -58,7 +58,7 @@ pub struct Photographs {
 /// Views on the device, and those that follow.
 #[derive(Debug)]
 struct OpenPool {
-    loader: ViewLoader,
+    loader: ViewLoader<PhotoView>,
     pool: ViewPool,
     maps: DirectionMaps,
     noise: NoiseTiles,
@@ -86,14 +86,12 @@ impl Photographs {
             .collect();
         Ok(Self {
             rooms: EnvironmentLights::new(&panoramas, data.variants, stream(run.seed, 24)),
-            source: Arc::new(ViewSource {
-                recipe: PhotoViewRecipe {
-                    seed: stream(run.seed, 21),
-                    size: data.size,
-                    rays: data.rays,
-                },
-                library,
-            }),
+            recipe: PhotoViewRecipe {
+                seed: stream(run.seed, 21),
+                size: data.size,
+                rays: data.rays,
+            },
+            library: Arc::new(library),
             data: data.clone(),
             batch: run.batch,
             seed: stream(run.seed, 22),
@@ -106,12 +104,12 @@ impl Photographs {
 
     /// What views are cast of.
     pub(crate) fn library(&self) -> &Library {
-        &self.source.library
+        &self.library
     }
 
     /// Unused files of the folders.
     pub(crate) fn left_out(&self) -> &[SkippedFile] {
-        &self.source.library.left_out
+        &self.library.left_out
     }
 
     /// Leaves the rest of each batch to other processes. Called before the first batch.
@@ -134,22 +132,27 @@ impl Photographs {
     /// [`TrainError::Stopped`] if the run is asked to stop before the views are cast, [`TrainError::Fault`],
     /// [`TrainError::Torch`].
     pub fn batch(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
-        let newest = self.data.views_at(step);
-        let oldest = newest - self.data.views;
+        let end = self.data.views_at(step);
+        let window = ViewWindow {
+            oldest: end - self.data.views,
+            end,
+            batch: self.batch,
+            rank: self.rank,
+        };
         let mut open = match self.open.take() {
             Some(open) => open,
-            None => self.opened(oldest)?,
+            None => self.opened(window.oldest)?,
         };
-        while open.loader.next_number() < newest {
-            let place = self.place(open.loader.next_number(), open.pool.len());
+        while open.loader.next_number() < end {
+            let place = window.place(open.loader.next_number(), open.pool.len());
             open.pool.put(place, open.loader.next_view()?)?;
         }
-        let (seeds, places): (Vec<u64>, Vec<usize>) = (0..self.batch)
-            .filter(|sample| sample % u64::from(self.rank.world_size()) == self.index())
+        let (seeds, places): (Vec<u64>, Vec<usize>) = window
+            .samples()
             .map(|sample| {
                 let seed = stream(stream(self.seed, step), sample);
-                let view = self.view_of(sample, oldest, seed);
-                (seed, self.place(view, open.pool.len()))
+                let view = window.view_of(sample, stream(seed, 0));
+                (seed, window.place(view, open.pool.len()))
             })
             .unzip();
         let (rooms, lamps) = (&self.rooms, open.pool.lamps());
@@ -184,33 +187,14 @@ impl Photographs {
         let device = self.resources.device;
         let views = self.data.views.div_ceil(of) as usize + 1;
         let pool = ViewPool::new(views, self.data.size, (self.kind, device))?;
+        let (library, recipe) = (Arc::clone(&self.library), self.recipe.clone());
+        let cast: Cast<PhotoView> = Arc::new(move |number| recipe.cast(&library, number));
+        let workers = self.resources.workers;
         Ok(OpenPool {
-            loader: ViewLoader::start(
-                &self.source,
-                self.rank,
-                first,
-                self.resources.workers,
-                stop,
-            )?,
-            maps: DirectionMaps::new(self.kind, device)?,
-            noise: NoiseTiles::new(pool.side(), self.seed, device)?,
+            loader: ViewLoader::start(&cast, self.rank, first, workers, stop)?,
+            maps: DirectionMaps::new(PhotoView::ORDER, (self.kind, device))?,
+            noise: NoiseTiles::new((3, pool.side()), self.seed, device)?,
             pool,
         })
-    }
-
-    fn index(&self) -> u64 {
-        u64::from(self.rank.index())
-    }
-
-    /// Where a view of this process lies in a pool.
-    fn place(&self, view: u64, pool: usize) -> usize {
-        (view / u64::from(self.rank.world_size())) as usize % pool
-    }
-
-    /// One of the views from `oldest` on whose number is that of the sample modulo the batch.
-    fn view_of(&self, sample: u64, oldest: u64, seed: u64) -> u64 {
-        let first = oldest + (sample + self.batch - oldest % self.batch) % self.batch;
-        let count = (oldest + self.data.views - first).div_ceil(self.batch);
-        first + self.batch * (stream(seed, 0) % count)
     }
 }

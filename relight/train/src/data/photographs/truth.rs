@@ -6,9 +6,10 @@ use relight_photo::nets::LIGHT_OUTPUTS;
 use tch::Tensor;
 
 use super::camera::{SimulatedPhotos, percentile};
-use super::lit::{LitBatch, PlannedPhoto, upload};
+use super::lit::{LitBatch, PlannedPhoto};
 use crate::data::sample::TruthBatch;
 use crate::data::symmetry::Symmetry;
+use crate::data::tensors::upload;
 use crate::error::TrainError;
 
 /// The power of the encoded colour.

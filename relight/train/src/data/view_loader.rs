@@ -1,6 +1,6 @@
 //! Threads that cast views ahead of the network that learns from them, handed out in the order of their numbers.
 //!
-//! View n is a pure function of the recipe, the library and n, whatever the number of threads: a run that is resumed sees the
+//! View n is a pure function of n, whatever the number of threads: a run that is resumed sees the
 //! views that it would have seen.
 
 use std::path::Path;
@@ -12,7 +12,6 @@ use std::time::Duration;
 
 use crate::error::TrainError;
 use relight_core::reader::Rank;
-use relight_synth::{Library, PhotoView, PhotoViewRecipe};
 
 /// Views that wait to be taken, for each thread.
 const AHEAD: usize = 2;
@@ -21,18 +20,14 @@ const LOOK: Duration = Duration::from_millis(100);
 
 const NOT_CAST: TrainError = TrainError::Fault("a view could not be cast");
 
-/// What views are cast of.
-#[derive(Debug)]
-pub(super) struct ViewSource {
-    pub(super) recipe: PhotoViewRecipe,
-    pub(super) library: Library,
-}
+/// Casts the view of a number.
+pub(super) type Cast<V> = Arc<dyn Fn(u64) -> V + Send + Sync>;
 
 /// Threads that cast views.
 #[derive(Debug)]
-pub(super) struct ViewLoader {
+pub(super) struct ViewLoader<V> {
     /// One queue a thread: thread `i` of `n` casts views `i`, `i + n`, `i + 2 n`, ... of this process.
-    queues: Vec<Receiver<PhotoView>>,
+    queues: Vec<Receiver<V>>,
     /// The queue of the next view.
     turn: usize,
     next: u64,
@@ -42,14 +37,14 @@ pub(super) struct ViewLoader {
     threads: Vec<JoinHandle<()>>,
 }
 
-impl ViewLoader {
+impl<V: Send + 'static> ViewLoader<V> {
     /// Threads that cast one process's views from the number `first` on: view n is that of rank n modulo the world size.
     /// `stop` ends waiting for one.
     ///
     /// # Errors
     /// [`TrainError::Io`].
     pub(super) fn start(
-        source: &Arc<ViewSource>,
+        cast: &Cast<V>,
         rank: Rank,
         first: u64,
         threads: usize,
@@ -68,19 +63,18 @@ impl ViewLoader {
         };
         for thread in 0..count {
             let (sender, views) = sync_channel(AHEAD);
-            let source = Arc::clone(source);
+            let cast = Arc::clone(cast);
             let numbers = (first + thread as u64 * stride..).step_by(count * stride as usize);
-            let cast = move || {
+            let work = move || {
                 for number in numbers {
                     // Nobody takes views any more once the loader is dropped.
-                    let view = source.recipe.cast(&source.library, number);
-                    if sender.send(view).is_err() {
+                    if sender.send(cast(number)).is_err() {
                         return;
                     }
                 }
             };
             let thread = thread::Builder::new().name(format!("cast-{thread}"));
-            let thread = thread.spawn(cast).map_err(TrainError::io(
+            let thread = thread.spawn(work).map_err(TrainError::io(
                 Path::new("the threads that cast views"),
                 "started",
             ))?;
@@ -99,7 +93,7 @@ impl ViewLoader {
     ///
     /// # Errors
     /// [`TrainError::Fault`] if casting panicked: a fault of the program. [`TrainError::Stopped`].
-    pub(super) fn next_view(&mut self) -> Result<PhotoView, TrainError> {
+    pub(super) fn next_view(&mut self) -> Result<V, TrainError> {
         loop {
             if self.stop.load(Ordering::Relaxed) {
                 return Err(TrainError::Stopped);
@@ -118,7 +112,7 @@ impl ViewLoader {
     }
 }
 
-impl Drop for ViewLoader {
+impl<V> Drop for ViewLoader<V> {
     fn drop(&mut self) {
         // Without a receiver, threads end after the view they are at.
         self.queues.clear();

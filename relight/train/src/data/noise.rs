@@ -1,0 +1,44 @@
+//! Noise that is the same for the same seeds, on any device.
+
+use tch::{Device, Kind, Tensor};
+
+use super::tensors::indices;
+use crate::error::TrainError;
+use relight_synth::stream;
+
+/// Tiles of noise: each sample has one of them.
+const TILES: usize = 32;
+
+/// Noise of standard deviation 1 to draw from.
+#[derive(Debug)]
+pub(crate) struct NoiseTiles(Tensor);
+
+impl NoiseTiles {
+    pub(crate) fn new(
+        (planes, side): (i64, i64),
+        seed: u64,
+        device: Device,
+    ) -> Result<Self, TrainError> {
+        let count = TILES * (planes * side * side) as usize;
+        let values: Vec<half::f16> = (0..count as u64)
+            .map(|at| half::f16::from_f32(normal_of(stream(seed, at))))
+            .collect();
+        let tiles = Tensor::f_from_slice(&values)?
+            .f_reshape([TILES as i64, planes, side, side])?
+            .f_to_device(device)?;
+        Ok(Self(tiles))
+    }
+
+    /// One tile for each seed.
+    pub(crate) fn of(&self, seeds: &[u64], kind: Kind) -> Result<Tensor, TrainError> {
+        let device = self.0.device();
+        let chosen = indices(seeds.iter().map(|seed| *seed as usize % TILES), device)?;
+        Ok(self.0.f_index_select(0, &chosen)?.f_to_kind(kind)?)
+    }
+}
+
+/// Nearly normally distributed, mean 0, standard deviation 1: the sum of four even numbers, each of the variance 1 / 12.
+fn normal_of(hash: u64) -> f32 {
+    let parts = [0, 16, 32, 48].map(|shift| (hash >> shift & 0xffff) as f32 / 65_535.0);
+    (parts.iter().sum::<f32>() - 2.0) * 3.0_f32.sqrt()
+}

@@ -1,0 +1,245 @@
+//! Turns to learn from: processor cores cast views once, the device lights them over whole turns, as curves of brightness.
+//!
+//! | file | concern |
+//! | --- | --- |
+//! | `turn_pool` | the views of a step, on the device |
+//! | `lit` | the curves of views in a light |
+//! | `camera` | clipping, errors of the table's angle, noise |
+//! | `input` | the network's input |
+//!
+//! A batch is a function of the settings and its step, whatever the number of threads and processes.
+
+mod camera;
+mod input;
+mod lit;
+#[cfg(test)]
+mod tests;
+mod turn_pool;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use tch::{Kind, Tensor, no_grad};
+
+use self::camera::filmed;
+use self::input::network_input;
+use self::lit::{LitTurns, PlannedTurn};
+use self::turn_pool::TurnPool;
+use super::direction_maps::DirectionMaps;
+use super::noise::NoiseTiles;
+use super::view_loader::{Cast, ViewLoader};
+use super::view_ring::ViewWindow;
+use crate::engine::task::Resources;
+use crate::error::TrainError;
+use crate::settings::TransferSettings;
+use relight_core::light::Panorama;
+use relight_core::reader::Rank;
+use relight_synth::{
+    CURVE_TERMS, EnvironmentLights, Folders, Library, SkippedFile, TurnPlan, TurnView,
+    TurnViewRecipe, stream,
+};
+
+/// Views that are drawn for training, for validation.
+const TRAINING: u64 = 41;
+const VALIDATION: u64 = 42;
+/// The least albedo whose logarithm is learned.
+const MIN_ALBEDO: f64 = 0.002;
+
+/// The batches of a run, lit while it trains.
+#[derive(Debug)]
+pub(crate) struct Turns {
+    library: Arc<Library>,
+    recipe: TurnViewRecipe,
+    rooms: EnvironmentLights,
+    rank: Rank,
+    resources: Resources,
+    /// Opened with the first batch, at the position of its step.
+    open: Option<OpenPool>,
+}
+
+/// Views on the device, and those that follow.
+#[derive(Debug)]
+struct OpenPool {
+    loader: ViewLoader<TurnView>,
+    pool: TurnPool,
+    maps: DirectionMaps,
+    noise: NoiseTiles,
+}
+
+/// A batch of turns for the network.
+#[derive(Debug)]
+pub(crate) struct TurnBatch {
+    /// `batch x channels x height x width`.
+    pub(crate) input: Tensor,
+    /// Unit normals, 3 channels.
+    pub(crate) normals: Tensor,
+    /// The logarithm of the albedo, 3 channels.
+    pub(crate) log_albedo: Tensor,
+    /// 1 where the object is, 1 channel.
+    pub(crate) mask: Tensor,
+}
+
+/// From which views a batch is drawn: from those of these numbers, by a seed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TurnDraw {
+    /// The oldest view.
+    pub(crate) oldest: u64,
+    /// The first view that is not one of them.
+    pub(crate) end: u64,
+    /// Samples of a batch.
+    pub(crate) batch: u64,
+    /// The seed of all draws.
+    pub(crate) seed: u64,
+}
+
+impl Turns {
+    /// For training: the training part of the library.
+    pub(crate) fn for_training(
+        settings: &TransferSettings,
+        seed: u64,
+        resources: Resources,
+    ) -> Result<Self, TrainError> {
+        let panoramas = settings.panoramas.clone();
+        let library = read(settings, panoramas)?.training()?;
+        Self::new(settings, library, stream(seed, TRAINING), resources)
+    }
+
+    /// For validation: the validation part of the library, in rooms of its own, the same for all seeds.
+    pub(crate) fn for_validation(
+        settings: &TransferSettings,
+        resources: Resources,
+    ) -> Result<Self, TrainError> {
+        let panoramas = settings.validation_panoramas.clone();
+        let library = read(settings, panoramas)?.validation()?;
+        Self::new(settings, library, VALIDATION, resources)
+    }
+
+    fn new(
+        settings: &TransferSettings,
+        library: Library,
+        seed: u64,
+        resources: Resources,
+    ) -> Result<Self, TrainError> {
+        let panoramas: Vec<&Panorama> = (0..library.panoramas.len())
+            .filter_map(|number| library.panoramas.get(number))
+            .collect();
+        Ok(Self {
+            rooms: EnvironmentLights::new(&panoramas, settings.variants, seed),
+            recipe: TurnViewRecipe {
+                seed,
+                size: settings.size,
+                rays: settings.rays,
+            },
+            library: Arc::new(library),
+            rank: Rank::ONLY,
+            resources,
+            open: None,
+        })
+    }
+
+    /// Unused files of the folders.
+    pub(crate) fn left_out(&self) -> &[SkippedFile] {
+        &self.library.left_out
+    }
+
+    /// Leaves the rest of each batch to other processes. Called before the first batch.
+    pub(crate) fn set_rank(&mut self, rank: Rank) {
+        self.rank = rank;
+    }
+
+    /// This process's part of a batch; the views of each come after those of the last.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`] if the run is asked to stop before the views are cast, [`TrainError::Fault`],
+    /// [`TrainError::Torch`].
+    pub(crate) fn batch(&mut self, draw: TurnDraw, views: u64) -> Result<TurnBatch, TrainError> {
+        let window = ViewWindow {
+            oldest: draw.oldest,
+            end: draw.end,
+            batch: draw.batch,
+            rank: self.rank,
+        };
+        let mut open = match self.open.take() {
+            Some(open) => open,
+            None => self.opened(draw.oldest, views)?,
+        };
+        while open.loader.next_number() < draw.end {
+            let place = window.place(open.loader.next_number(), open.pool.len());
+            open.pool.put(place, &open.loader.next_view()?)?;
+        }
+        let (seeds, places): (Vec<u64>, Vec<usize>) = window
+            .samples()
+            .map(|sample| {
+                let seed = stream(draw.seed, sample);
+                let view = window.view_of(sample, stream(seed, 0));
+                (seed, window.place(view, open.pool.len()))
+            })
+            .unzip();
+        let (rooms, elevations) = (&self.rooms, open.pool.elevations());
+        let turns: Vec<PlannedTurn> = seeds
+            .par_iter()
+            .zip(places)
+            .map(|(&seed, place)| PlannedTurn {
+                place,
+                plan: TurnPlan::draw(stream(seed, 1), elevations[place], rooms),
+            })
+            .collect();
+        let batch = no_grad(|| batch_of(&open, &turns, &seeds))?;
+        self.open = Some(open);
+        Ok(batch)
+    }
+
+    /// A pool of so many views, whose first is that of a number.
+    fn opened(&self, first: u64, views: u64) -> Result<OpenPool, TrainError> {
+        let of = u64::from(self.rank.world_size());
+        // The other processes of a group wait for this one's first step.
+        let stop = if self.rank == Rank::ONLY {
+            Arc::clone(&self.resources.stop)
+        } else {
+            Arc::default()
+        };
+        let place = (Kind::Float, self.resources.device);
+        let views = views.div_ceil(of) as usize + 1;
+        let pool = TurnPool::new(views, self.recipe.size, place)?;
+        let (library, recipe) = (Arc::clone(&self.library), self.recipe.clone());
+        let cast: Cast<TurnView> = Arc::new(move |number| recipe.cast(&library, number));
+        let planes = (3 * (CURVE_TERMS - 1)) as i64;
+        Ok(OpenPool {
+            loader: ViewLoader::start(&cast, self.rank, first, self.resources.workers, stop)?,
+            maps: DirectionMaps::new(TurnView::ORDER, place)?,
+            noise: NoiseTiles::new((planes, pool.side()), self.recipe.seed, place.1)?,
+            pool,
+        })
+    }
+}
+
+fn read(
+    settings: &TransferSettings,
+    panoramas: Option<std::path::PathBuf>,
+) -> Result<Library, TrainError> {
+    Ok(Library::read(&Folders {
+        meshes: settings.meshes.clone(),
+        textures: None,
+        panoramas,
+    })?)
+}
+
+fn batch_of(
+    open: &OpenPool,
+    turns: &[PlannedTurn],
+    seeds: &[u64],
+) -> Result<TurnBatch, TrainError> {
+    let lit = LitTurns::new(&open.pool, &open.maps, turns)?;
+    let noise = open.noise.of(seeds, Kind::Float)?;
+    let seen = filmed(lit, turns, &noise)?;
+    Ok(TurnBatch {
+        input: network_input(&seen.curves, &seen.mask, turns)?,
+        log_albedo: seen
+            .albedo
+            .f_clamp_min(MIN_ALBEDO)?
+            .f_log()?
+            .f_mul(&seen.mask)?,
+        normals: seen.normals,
+        mask: seen.mask,
+    })
+}

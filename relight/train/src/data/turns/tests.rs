@@ -1,0 +1,268 @@
+use relight_synth::{CurveTerms, made_panoramas, terms_of};
+use relight_turn::NetworkTurn;
+use tch::Device;
+
+use super::*;
+
+const SIZE: usize = 32;
+
+/// Views and turns of them.
+fn planned(count: u64) -> (OpenPool, Vec<PlannedTurn>, Vec<TurnView>) {
+    let library = Library::read(&Folders::default()).unwrap();
+    let recipe = TurnViewRecipe {
+        seed: 4,
+        size: SIZE as u32,
+        rays: 64,
+    };
+    let views: Vec<TurnView> = (0..3).map(|number| recipe.cast(&library, number)).collect();
+    let place = (Kind::Float, Device::Cpu);
+    let mut pool = TurnPool::new(3, recipe.size, place).unwrap();
+    for (place, view) in views.iter().enumerate() {
+        pool.put(place, view).unwrap();
+    }
+    let made = made_panoramas().unwrap();
+    let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
+    let rooms = EnvironmentLights::new(&panoramas, 2, 1);
+    let turns = (0..count)
+        .map(|seed| {
+            let place = seed as usize % 3;
+            let plan = TurnPlan::draw(seed, views[place].elevation, &rooms);
+            PlannedTurn { place, plan }
+        })
+        .collect();
+    let cast: Cast<TurnView> = Arc::new(move |number| recipe.cast(&library, number));
+    let open = OpenPool {
+        loader: ViewLoader::start(&cast, Rank::ONLY, 3, 1, Arc::default()).unwrap(),
+        pool,
+        maps: DirectionMaps::new(TurnView::ORDER, place).unwrap(),
+        noise: NoiseTiles::new((36, SIZE as i64), 1, Device::Cpu).unwrap(),
+    };
+    (open, turns, views)
+}
+
+/// The curve of a pixel of a diffuse object in a light, by the formulas, number by number.
+fn by_formula(
+    view: &TurnView,
+    plan: &TurnPlan,
+    pixel: usize,
+    mean: [f64; 3],
+) -> [[f64; 3]; CURVE_TERMS] {
+    let area = SIZE * SIZE;
+    let of = |plane: usize| f64::from(view.base[plane * area + pixel]);
+    let finish = plan.finish * TurnView::FINISH_PLANES;
+    let own = |plane: usize| f64::from(view.finishes[(finish + plane) * area + pixel]);
+    let normal = [0, 1, 2].map(own);
+    let rows = TurnView::to_table(view.elevation);
+    let [x, y, z] = rows.map(|row| {
+        (0..3)
+            .map(|axis| f64::from(row[axis]) * normal[axis])
+            .sum::<f64>()
+    });
+    let direction = relight_core::light::Direction::new(x, y, z).unwrap();
+    let harmonics = relight_core::light::basis(TurnView::ORDER, direction);
+    let albedo: [f64; 3] = match plan.plain {
+        Some(plain) => plain.map(f64::from),
+        None => [3, 4, 5].map(|plane| own(plane) * f64::from(plan.brightness)),
+    };
+    std::array::from_fn(|term| {
+        [0, 1, 2].map(|c| {
+            let mut sum = 0.0;
+            for (k, light) in plan.light.iter().enumerate() {
+                let lobe = relight_core::render::cosine_lobe(k.isqrt());
+                let bounced = match k {
+                    0..9 => of(TurnView::BOUNCED + k) * mean[c] * f64::from(plan.material.bounce),
+                    _ => 0.0,
+                };
+                let taken = harmonics[k] * lobe - of(TurnView::BLOCKED + k) + bounced;
+                sum += taken * f64::from(light[term][c]);
+            }
+            sum * albedo[c] / std::f64::consts::PI
+        })
+    })
+}
+
+#[test]
+fn tensors_light_turns_as_the_formulas_do_one_by_one() {
+    let (open, mut turns, views) = planned(24);
+    for turn in &mut turns {
+        turn.plan.material.is_metal = false;
+        turn.plan.material.reflectance = 0.0;
+    }
+    let lit = LitTurns::new(&open.pool, &open.maps, &turns).unwrap();
+    let means = lit::mean_over(&lit.albedo, &lit.mask).unwrap();
+    let (mut off, mut sum) = (0.0, 0.0);
+    for (at, turn) in turns.iter().enumerate() {
+        let view = &views[turn.place];
+        let mean = [0, 1, 2].map(|c| means.double_value(&[at as i64, c, 0, 0]));
+        for pixel in (0..SIZE * SIZE)
+            .filter(|&p| f32::from(view.base[p]) > 0.5)
+            .step_by(5)
+        {
+            let expected = by_formula(view, &turn.plan, pixel, mean);
+            let (y, x) = ((pixel / SIZE) as i64, (pixel % SIZE) as i64);
+            for (term, expected) in expected.iter().enumerate() {
+                for (c, expected) in expected.iter().enumerate() {
+                    let place = [at as i64, term as i64, c as i64, y, x];
+                    off += (lit.curves.double_value(&place) - expected).powi(2);
+                    sum += expected.powi(2);
+                }
+            }
+        }
+    }
+    assert!((off / sum).sqrt() < 0.01, "{off} of {sum}");
+}
+
+/// The covered pixels of a turn of a batch, and their curves.
+fn curves_of(lit: &LitTurns, at: usize) -> (Vec<u32>, Vec<CurveTerms>) {
+    let pixels: Vec<u32> = (0..(SIZE * SIZE) as u32)
+        .filter(|&pixel| {
+            let (y, x) = (
+                i64::from(pixel) / SIZE as i64,
+                i64::from(pixel) % SIZE as i64,
+            );
+            lit.mask.double_value(&[at as i64, 0, y, x]) > 0.5
+        })
+        .collect();
+    let curves = pixels.iter().map(|&pixel| {
+        let (y, x) = (
+            i64::from(pixel) / SIZE as i64,
+            i64::from(pixel) % SIZE as i64,
+        );
+        std::array::from_fn(|term| {
+            [0, 1, 2].map(|c| lit.curves.double_value(&[at as i64, term as i64, c, y, x]) as f32)
+        })
+    });
+    (pixels.clone(), curves.collect())
+}
+
+#[test]
+fn the_network_sees_the_same_in_training_as_at_work() {
+    let (open, turns, _) = planned(12);
+    let lit = LitTurns::new(&open.pool, &open.maps, &turns).unwrap();
+    let noise = open.noise.of(&[7; 12], Kind::Float).unwrap();
+    let seen = filmed(lit, &turns, &noise).unwrap();
+    let input = network_input(&seen.curves, &seen.mask, &turns).unwrap();
+    for (at, turn) in turns.iter().enumerate() {
+        let (pixels, curves) = curves_of(&seen, at);
+        let at_work = relight_turn::network_input(&NetworkTurn {
+            side: SIZE,
+            pixels: &pixels,
+            curves: &curves,
+            elevation: turn.plan.elevation,
+        });
+        let at_work = Tensor::from_slice(&at_work).reshape(input.get(at as i64).size());
+        let apart = (input.get(at as i64) - at_work)
+            .abs()
+            .max()
+            .double_value(&[]);
+        assert!(apart < 2e-3, "turn {at}: {apart}");
+    }
+}
+
+#[test]
+fn a_turn_is_the_same_whatever_else_is_in_its_batch() {
+    let (open, turns, _) = planned(12);
+    let seeds: Vec<u64> = (0..12).collect();
+    let all = batch_of(&open, &turns, &seeds).unwrap();
+    for at in 0..turns.len() {
+        let one = batch_of(&open, &turns[at..=at], &seeds[at..=at]).unwrap();
+        for (one, all) in [(one.input, &all.input), (one.normals, &all.normals)] {
+            let apart = one.get(0) - all.get(at as i64);
+            assert!(apart.abs().max().double_value(&[]) < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn in_a_mirror_a_turn_is_that_of_the_mirrored_object_in_the_mirrored_light() {
+    let (open, mut turns, _) = planned(6);
+    let filmed_with = |turns: &[PlannedTurn]| {
+        let lit = LitTurns::new(&open.pool, &open.maps, turns).unwrap();
+        let noise = Tensor::zeros(
+            [6, 36, SIZE as i64, SIZE as i64],
+            (Kind::Float, Device::Cpu),
+        );
+        filmed(lit, turns, &noise).unwrap()
+    };
+    for turn in &mut turns {
+        turn.plan.is_mirrored = false;
+        turn.plan.timing = None;
+        turn.plan.clipped = None;
+    }
+    let own = filmed_with(&turns);
+    turns
+        .iter_mut()
+        .for_each(|turn| turn.plan.is_mirrored = true);
+    let mirrored = filmed_with(&turns);
+    // At the angle a the mirrored turn shows the mirror image of what the other shows at -a.
+    for (at, angle) in [(0, 0.4), (3, 2.9), (5, -1.3)] {
+        let shown = |of: &LitTurns, angle: f64| {
+            let mut sum = of.curves.get(at).get(0);
+            for m in 1..=6_i64 {
+                let (sin, cos) = (m as f64 * angle).sin_cos();
+                sum += of.curves.get(at).get(2 * m - 1) * cos - of.curves.get(at).get(2 * m) * sin;
+            }
+            sum
+        };
+        // x becomes -x: azimuths are counted from the other side, half a turn further.
+        let expected = shown(&own, -angle).flip([-1]);
+        let found = shown(&mirrored, angle + std::f64::consts::PI);
+        let apart = (found - &expected).abs().max().double_value(&[]);
+        let largest = expected.abs().max().double_value(&[]);
+        assert!(apart < 1e-3 * largest, "turn {at}: {apart} of {largest}");
+    }
+}
+
+#[test]
+fn clipped_curves_stay_below_white_and_unclipped_ones_as_they_are() {
+    let (open, mut turns, _) = planned(6);
+    for turn in &mut turns {
+        turn.plan.is_mirrored = false;
+        turn.plan.timing = None;
+        turn.plan.clipped = None;
+        turn.plan.noise = [0.0; 2];
+    }
+    let noise = Tensor::zeros(
+        [6, 36, SIZE as i64, SIZE as i64],
+        (Kind::Float, Device::Cpu),
+    );
+    let film = |turns: &[PlannedTurn]| {
+        let lit = LitTurns::new(&open.pool, &open.maps, turns).unwrap();
+        filmed(lit, turns, &noise).unwrap().curves
+    };
+    let before = film(&turns);
+    turns[2].plan.clipped = Some(0.7);
+    let after = film(&turns);
+    for at in [0, 1, 3, 4, 5] {
+        assert_eq!(before.get(at), after.get(at));
+    }
+    let means = |of: &Tensor| of.get(2).get(0);
+    assert!((means(&before) - means(&after)).min().double_value(&[]) > -1e-6);
+    assert!((means(&before) - means(&after)).max().double_value(&[]) > 0.0);
+}
+
+#[test]
+fn a_light_that_turns_is_the_sum_of_its_terms() {
+    let made = made_panoramas().unwrap();
+    let light = made[0].1.project(TurnView::ORDER);
+    let terms = terms_of(&light);
+    let angle = 0.7_f64;
+    let axis = relight_core::light::Direction::new(0.0, 0.0, 1.0).unwrap();
+    let turned = light.rotated(&relight_core::light::Rotation::about(axis, -angle));
+    for (k, terms) in terms.iter().enumerate() {
+        let l = k.isqrt();
+        if k.abs_diff(l * (l + 1)) > 6 {
+            continue;
+        }
+        let mut sum = f64::from(terms[0][1]);
+        for m in 1..=6 {
+            let (sin, cos) = (m as f64 * angle).sin_cos();
+            sum += f64::from(terms[2 * m - 1][1]) * cos - f64::from(terms[2 * m][1]) * sin;
+        }
+        let expected = turned.coefficients()[k][1];
+        assert!(
+            (sum - expected).abs() < 1e-4 * expected.abs().max(1.0),
+            "{k}: {sum} {expected}"
+        );
+    }
+}

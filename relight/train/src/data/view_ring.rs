@@ -1,0 +1,94 @@
+//! Views on the device: a ring in which new ones replace the oldest.
+
+use tch::{Device, Kind, Tensor};
+
+use super::tensors::indices;
+use crate::error::TrainError;
+use relight_core::reader::Rank;
+
+/// Planes of views, in half precision.
+#[derive(Debug)]
+pub(super) struct ViewPlanes {
+    /// `(views x each) x planes x side x side`.
+    planes: Tensor,
+    /// Parts of a view.
+    each: usize,
+    /// The type of what is computed of them.
+    kind: Kind,
+}
+
+impl ViewPlanes {
+    /// Room for so many views of `each` parts, each of `[planes, side]`; what is computed of them is of a kind.
+    pub(super) fn new(
+        (views, each): (usize, usize),
+        [planes, side]: [usize; 2],
+        (kind, device): (Kind, Device),
+    ) -> Result<Self, TrainError> {
+        let shape = [views * each, planes, side, side].map(|size| size as i64);
+        Ok(Self {
+            planes: Tensor::f_zeros(shape, (Kind::Half, device))?,
+            each,
+            kind,
+        })
+    }
+
+    /// Puts a view at a place.
+    pub(super) fn put(&self, place: usize, values: &[half::f16]) -> Result<(), TrainError> {
+        let each = self.each as i64;
+        let mut to = self.planes.f_narrow(0, place as i64 * each, each)?;
+        to.f_copy_(&Tensor::f_from_slice(values)?.f_reshape(to.size())?)?;
+        Ok(())
+    }
+
+    /// Parts, each by its view's place and its number: `parts x planes x side x side`.
+    pub(super) fn of(
+        &self,
+        chosen: impl Iterator<Item = (usize, usize)>,
+    ) -> Result<Tensor, TrainError> {
+        let at = chosen.map(|(place, part)| place * self.each + part);
+        let at = indices(at, self.planes.device())?;
+        Ok(self.planes.f_index_select(0, &at)?.f_to_kind(self.kind)?)
+    }
+
+    /// Width and height.
+    pub(super) fn side(&self) -> i64 {
+        self.planes.size()[3]
+    }
+}
+
+/// The views that a step draws from, by their numbers. Sample i of a batch is of a view whose number is i modulo the batch: where
+/// several processes share the batches, each casts the views of its samples only.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ViewWindow {
+    /// The oldest of them.
+    pub(super) oldest: u64,
+    /// The first that is not one of them.
+    pub(super) end: u64,
+    /// Samples of a batch, at most as many as views.
+    pub(super) batch: u64,
+    /// Which process this is.
+    pub(super) rank: Rank,
+}
+
+impl ViewWindow {
+    /// The samples of this process.
+    pub(super) fn samples(self) -> impl Iterator<Item = u64> {
+        let rank = self.rank;
+        let is_own =
+            move |sample: &u64| sample % u64::from(rank.world_size()) == u64::from(rank.index());
+        (0..self.batch).filter(is_own)
+    }
+
+    /// The view of a sample, drawn by a seed.
+    pub(super) fn view_of(self, sample: u64, seed: u64) -> u64 {
+        let batch = self.batch;
+        let first = self.oldest + (sample + batch - self.oldest % batch) % batch;
+        let count = self.end.saturating_sub(first).div_ceil(batch).max(1);
+        first + batch * (seed % count)
+    }
+
+    /// Where a view of this process lies in a ring of so many.
+    pub(super) fn place(self, view: u64, ring: usize) -> usize {
+        (view / u64::from(self.rank.world_size())) as usize % ring.max(1)
+    }
+}
