@@ -13,10 +13,11 @@ use crate::observe::curves::TurnCurves;
 
 /// Rounds of Gauss-Newton. Measured: more do not reduce the error.
 const ROUNDS: usize = 4;
-/// How much a curve counts beside the network, for a residual as large as its variation. Measured on 26 synthetic turns: 8 and 32
-/// are no better.
+/// How much a curve counts beside the network, for a residual as large as its variation. Measured on 26 synthetic turns: not
+/// better with 8 or 32.
 const CURVE_WEIGHT: f64 = 16.0;
-/// Residual of any curve, over its variation: shadows also change what a normal could explain. Measured: 0 and 0.2 are no better.
+/// Residual of any curve, over its variation: shadows also change what a normal could explain. Measured: not better
+/// with 0 or 0.2.
 const MIN_RESIDUAL: f64 = 0.05;
 /// Standard deviation of the surroundings that turn together, in widths of the frame. Measured: 0 and 1/32 are worse.
 const REACH: f32 = 1.0 / 64.0;
