@@ -25,7 +25,6 @@ before(async () => {
   browser = await launch();
   server = await serve(FOLDER);
   ({ page } = await open(browser, server.address, "desk"));
-  page.setDefaultTimeout(180_000);
   await settled(page);
   await startEngine(page);
   work = await mkdtemp(join(tmpdir(), "relight-agreement-"));

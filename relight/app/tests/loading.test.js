@@ -197,14 +197,11 @@ test("a damaged engine is said to be damaged", async () => {
 
 test("in a browser that cannot run the engine, what is chosen is answered with the reason", async () => {
   const server = await serve(FOLDER);
-  const context = await browser.newContext();
-  const page = await context.newPage();
-  await page.addInitScript(() => delete window.WebAssembly);
-  await page.goto(server.address);
+  const { page } = await open(browser, server.address, "desk", { script: () => delete window.WebAssembly });
   await steps.choose(page, photo);
   await page.waitForSelector("#alert:not([hidden])");
   assert.match(await page.textContent("#alert-text"), /cannot run relight/);
-  await context.close();
+  await page.context().close();
   await server.stop();
 });
 

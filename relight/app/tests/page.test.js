@@ -345,7 +345,6 @@ test("a video of the turning light", async () => {
   await steps.addBall(page, photo);
   await steps.tab(page, "save");
   await page.selectOption("#video-seconds", "3");
-  page.setDefaultTimeout(180_000);
   const { name, bytes } = await steps.downloaded(page, "#video");
   const isMp4 = bytes.toString("latin1", 4, 8) === "ftyp";
   const isWebm = bytes.readUInt32BE(0) === 0x1a45dfa3;
@@ -383,11 +382,8 @@ test("without WebGL the same picture is painted plainly", async () => {
 });
 
 /** The pixels of the stage with a ball that was moved by a key. */
-async function ballOnStage(server, script = () => {}) {
-  const context = await browser.newContext({ viewport: SIZES.desk });
-  const page = await context.newPage();
-  await page.addInitScript(script);
-  await page.goto(server.address);
+async function ballOnStage(server, script) {
+  const { page } = await open(browser, server.address, "desk", { script });
   await settled(page);
   await steps.addBall(page, photo);
   const before = await steps.stagePicture(page);
@@ -396,7 +392,7 @@ async function ballOnStage(server, script = () => {}) {
   assert.notEqual(await steps.stagePicture(page), before);
   const url = await page.evaluate(() => document.getElementById("picture").toDataURL());
   const pixels = await steps.decoded(page, Buffer.from(url.split(",")[1], "base64"));
-  await context.close();
+  await page.context().close();
   return pixels;
 }
 
@@ -416,9 +412,7 @@ test("photographs are opened as they are displayed, of every kind that cameras w
     await steps.choose(page, file);
     await page.waitForFunction((name) => document.getElementById("cut-name").textContent === name, file.name);
     await page.waitForSelector("body.cutting #cut-canvas[data-view]");
-    await page.waitForTimeout(100);
-    const shape = await shapeOfCut(page);
-    assert.ok(Math.abs(shape - width / height) < 0.02, `${file.name} is ${shape} times as wide as high`);
+    await page.waitForFunction(isCutOfShape, width / height);
     await steps.cutBall(page, { width, height });
     await page.click("#cut-done");
     await page.waitForFunction((name) => document.querySelector("#objects .entry")?.textContent === name, file.name);
@@ -449,25 +443,21 @@ test("a captured object stands in the scene without being cut out", async () => 
   await close();
 });
 
-/** Width by height of the photograph that is being cut out, as it lies in the middle of its canvas. */
-function shapeOfCut(page) {
-  return page.evaluate(() => {
-    const canvas = document.getElementById("cut-canvas");
-    const [, left, top] = canvas.dataset.view.split(" ").map(Number);
-    const { width, height } = canvas.getBoundingClientRect();
-    return (width - 2 * left) / (height - 2 * top);
-  });
+/** Runs in the page: whether the photograph that is being cut out is so many times as wide as high, as it lies in the middle of its
+ * canvas. */
+function isCutOfShape(shape) {
+  const canvas = document.getElementById("cut-canvas");
+  const [, left, top] = canvas.dataset.view.split(" ").map(Number);
+  const { width, height } = canvas.getBoundingClientRect();
+  return Math.abs((width - 2 * left) / (height - 2 * top) - shape) < 0.02;
 }
 
 test("a browser without WebAssembly is told so in a sentence", async () => {
   const server = await serve(FOLDER);
-  const context = await browser.newContext();
-  const page = await context.newPage();
-  await page.addInitScript(() => delete window.WebAssembly);
-  await page.goto(server.address);
+  const { page } = await open(browser, server.address, "desk", { script: () => delete window.WebAssembly });
   await page.waitForSelector("body.dead");
   assert.match(await page.textContent("#loading"), /cannot run relight/);
-  await context.close();
+  await page.context().close();
   await server.stop();
 });
 
