@@ -49,7 +49,9 @@ pub use geometry::GBuffer;
 pub use library::{Folders, Library, SkippedFile, made_panoramas};
 pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
 pub use mesh::Mesh;
-pub use pack::{LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library};
+pub use pack::{
+    LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library, is_packed,
+};
 pub use random::stream;
 pub use samples::folder::{SampleFolder, SynthSummary, write_samples};
 pub use samples::object::{ObjectSource, SyntheticView};
@@ -60,5 +62,5 @@ pub use shape::ShapeKind;
 pub use transfer::{
     CURVE_TERMS, CurveTerms, EnvironmentLights, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan,
     PhotoPrint, PhotoView, PhotoViewRecipe, TurnMaterial, TurnPlan, TurnView, TurnViewRecipe,
-    ViewLamp, terms_of,
+    ViewLamp,
 };

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::{fmt, fs};
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::SynthError;
 use super::lighting::Panoramas;
@@ -17,7 +16,6 @@ use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
 use relit_data::file_names::is_hidden;
-use relit_data::shard::Digest;
 use relit_data::statistics::ranked;
 
 /// Size of the panoramas that are made here.
@@ -159,21 +157,6 @@ impl Library {
             return Err(SynthError::Refused(fault.to_owned()));
         }
         Ok(self)
-    }
-
-    /// The digest of all that views and finishes are drawn from: meshes with their materials, and pictures.
-    pub fn digest(&self) -> Digest {
-        let meshes = self.meshes.par_iter();
-        let meshes: Vec<String> = meshes
-            .map(|(name, mesh)| format!("{name} {}\n", mesh.digest()))
-            .collect();
-        let pictures = self.pictures.par_iter().map(|picture| {
-            let mut bytes = Vec::new();
-            picture.write_to(&mut bytes);
-            format!("{}\n", Digest::hash(&bytes))
-        });
-        let pictures: Vec<String> = pictures.collect();
-        Digest::hash([meshes.concat(), pictures.concat()].join("\n").as_bytes())
     }
 
     /// The names of its meshes.

@@ -182,26 +182,6 @@ impl TextureImage {
         self.transparent_fraction
     }
 
-    /// All that [`Self::at`] follows from, as bytes.
-    pub(crate) fn write_to(&self, bytes: &mut Vec<u8>) {
-        bytes.extend(
-            [self.width, self.height]
-                .map(|side| side as u32)
-                .iter()
-                .flat_map(|side| side.to_le_bytes()),
-        );
-        match &self.texels {
-            Texels::Levels(texels, kind) => {
-                bytes.push(*kind as u8);
-                bytes.extend(texels.as_flattened());
-            }
-            Texels::Light(texels) => {
-                let values = texels.iter().flat_map(|texel| texel.to_array());
-                bytes.extend(values.flat_map(f32::to_le_bytes));
-            }
-        }
-    }
-
     /// The mean of all its colours; black without pixels.
     pub(super) fn mean(&self) -> Vec3 {
         self.mean

@@ -671,6 +671,35 @@ fn a_run_that_is_asked_to_stop_while_its_first_views_are_cast_stops_then() {
 }
 
 #[test]
+fn a_run_that_is_asked_to_stop_while_its_validation_is_cast_keeps_a_checkpoint() {
+    let settings = TurnNetworkSettings {
+        run: small_run(4),
+        data: TransferSettings {
+            size: 32,
+            views: 4,
+            first_views: 4,
+            rays: 4096,
+            variants: 1,
+            validation: 500,
+            ..TransferSettings::default()
+        },
+    };
+    let (resources, folder) = (resources(), tempfile::tempdir().unwrap());
+    let stop = Arc::clone(&resources.stop);
+    stop.store(true, Ordering::Relaxed);
+    let mut task = TurnNetworkTask::new(settings.clone(), resources, None).unwrap();
+    let mut observer = StopAfter {
+        steps: u64::MAX,
+        stop: &AtomicBool::new(false),
+        damage: Vec::new(),
+    };
+    let run = Run::open(&mut task, &settings.run, folder.path(), false, None).unwrap();
+    let outcome = run.finish(&stop, &mut observer).unwrap();
+    assert_eq!((outcome.steps, outcome.stopped), (0, true));
+    assert!(Checkpoint::path(folder.path()).is_file());
+}
+
+#[test]
 fn a_run_that_another_program_makes_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let (mut task, settings) = decompose_task(1);

@@ -67,8 +67,9 @@ const SHIPPED_FACTS: [(&str, &str); 2] = [
     ("licence", "MIT OR Apache-2.0"),
     (
         "attribution",
-        "learned from procedural shapes, panoramas of Poly Haven (CC0) and meshes of odedstein/meshes (public domain, CC BY 3.0 and \
-         CC BY 4.0), whose authors relight/cli/weights/README.md names",
+        "learned from procedural shapes, panoramas of Poly Haven, Blender and @pmndrs/assets (CC0), meshes of odedstein/meshes (public \
+         domain, CC BY 3.0 and CC BY 4.0) and, for turns, furniture of Sweet Home 3D (CC0 and CC BY 3.0), whose authors \
+         relight/cli/weights/README.md names",
     ),
 ];
 

@@ -1,6 +1,6 @@
-//! The network of whole turns: normals and shading from the harmonics of every pixel's curve over the table's angle.
+//! The network of whole turns: normals and albedo from the harmonics of every pixel's curve over the table's angle.
 //!
-//! Input, [`TURN_INPUTS`] channels: what `relight_turn` makes of the curves (`relight_turn::NetworkInput`). Output
+//! Input, [`TURN_INPUTS`] channels: what `relight_turn` makes of the curves (`relight_turn::network_input`). Output
 //! `normals`, [`TURN_OUTPUTS`] channels: the normal in the viewer's frame before its length is made 1 (3), and the
 //! logarithm of the expected length of the chord to the true one (1). Output `albedo`, [`ALBEDO_OUTPUTS`] channels: the
 //! logarithm of albedo over the mean of the curve, each channel in any unit.

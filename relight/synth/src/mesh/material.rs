@@ -114,33 +114,6 @@ impl MeshMaterials {
         used.any(|one| one.picture.is_some() || one.colour != first.colour)
     }
 
-    /// All that [`Self::at`] follows from, as bytes.
-    pub(crate) fn write_to(&self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.of_triangle.iter().flat_map(|one| one.to_le_bytes()));
-        for material in &self.all {
-            let MeshMaterial {
-                colour,
-                roughness,
-                metallic,
-                ..
-            } = material;
-            let numbers = colour.to_array().into_iter().chain([*roughness, *metallic]);
-            bytes.extend(numbers.flat_map(f32::to_le_bytes));
-            for picture in [&material.picture, &material.factors] {
-                bytes.push(u8::from(picture.is_some()));
-                let Some(picture) = picture else { continue };
-                let placed = picture.placed.unwrap_or(Affine2::IDENTITY);
-                bytes.extend(
-                    placed
-                        .to_cols_array()
-                        .into_iter()
-                        .flat_map(f32::to_le_bytes),
-                );
-                picture.image.write_to(bytes);
-            }
-        }
-    }
-
     /// The look of a triangle at a place of its pictures, under a colour that multiplies them.
     pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>, paint: Vec3) -> SurfaceSample {
         let number = self.of_triangle.get(triangle).copied().unwrap_or(u32::MAX);

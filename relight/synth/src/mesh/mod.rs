@@ -18,7 +18,6 @@ use glam::{Vec2, Vec3};
 use super::SynthError;
 pub(crate) use material::{MeshMaterial, MeshMaterials, PlacedPicture, SurfaceSample};
 pub(crate) use raw::{NO_TEXTURE, RawMesh};
-use relit_data::shard::Digest;
 
 /// Most triangles that a mesh may have.
 const MAX_TRIANGLES: usize = 20_000_000;
@@ -109,27 +108,6 @@ impl Mesh {
             None => Vec3::ONE,
         };
         Some(materials.at(triangle, place, paint))
-    }
-
-    /// The digest of everything that determines the mesh's pictures.
-    pub(super) fn digest(&self) -> Digest {
-        let mut bytes = Vec::new();
-        let mut add = |values: &[f32]| bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
-        self.positions.iter().for_each(|p| add(&p.to_array()));
-        self.colours
-            .iter()
-            .flatten()
-            .for_each(|c| add(&c.to_array()));
-        self.texture
-            .iter()
-            .flatten()
-            .for_each(|t| add(&t.to_array()));
-        let corners = self.triangles.as_flattened();
-        bytes.extend(corners.iter().flat_map(|vertex| vertex.to_le_bytes()));
-        if let Some(materials) = &self.materials {
-            materials.write_to(&mut bytes);
-        }
-        Digest::hash(&bytes)
     }
 
     /// Texture coordinates for each corner of each triangle, where all of them have some.

@@ -69,6 +69,6 @@ fn is_for_validation(name: &str) -> bool {
 }
 
 /// Whether a path is that of a packed library.
-pub(crate) fn is_packed(path: &Path) -> bool {
+pub fn is_packed(path: &Path) -> bool {
     relit_data::file_names::has_extension(path, &[LIBRARY_EXTENSION]) && path.is_file()
 }

@@ -52,12 +52,7 @@ impl Finish {
     }
 
     /// The same for an object whose materials, if it has any, are painted over.
-    pub(crate) fn painted(
-        random: &mut Random,
-        buffer: &GBuffer,
-        library: &Library,
-        glossy: f32,
-    ) -> Self {
+    fn painted(random: &mut Random, buffer: &GBuffer, library: &Library, glossy: f32) -> Self {
         let pictures = library.pictures.len();
         let paint = Paint::draw(random, &buffer.object_points, pictures);
         let relief = random.chance(RELIEF).then(|| Relief::draw(random));

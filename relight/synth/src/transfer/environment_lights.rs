@@ -60,11 +60,6 @@ impl EnvironmentLights {
         }
     }
 
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.panoramas.is_empty()
-    }
-
     /// The room of a seed, in the table's frame; even light without panoramas.
     pub fn draw(&self, seed: u64) -> ShLight {
         let mut random = Random::new(seed);

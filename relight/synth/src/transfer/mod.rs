@@ -39,7 +39,7 @@ use relight_core::render::cosine_lobe;
 pub use environment_lights::EnvironmentLights;
 pub use photo_plan::{PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint};
 pub use photo_view::{PhotoView, PhotoViewRecipe, ViewLamp};
-pub use turn_plan::{CURVE_TERMS, CurveTerms, TurnMaterial, TurnPlan, terms_of};
+pub use turn_plan::{CURVE_TERMS, CurveTerms, TurnMaterial, TurnPlan};
 pub use turn_view::{TurnView, TurnViewRecipe};
 
 /// The order of the light: lamps are blurred by it, and gloss as smooth as varnish.

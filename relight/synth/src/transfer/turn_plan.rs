@@ -150,7 +150,7 @@ impl TurnMaterial {
     /// The gloss of a power of the half vector's cosine, which the transfer shows as a Gaussian around the mirrored
     /// direction: the lobe's solid angle is 8 π / (exponent + 1) times the cosine to the eye, and light moves by twice the
     /// half vector's angle.
-    pub fn with_half_vector(self, reflectance: f32, exponent: f32) -> Self {
+    pub(super) fn with_half_vector(self, reflectance: f32, exponent: f32) -> Self {
         Self {
             reflectance: 8.0 * reflectance / (exponent + 1.0),
             blur: 2.0 / exponent.max(1.0).sqrt(),
@@ -162,7 +162,7 @@ impl TurnMaterial {
 
 /// The light that makes each term of a curve: with the pairs of order m as complex numbers, `L_m = L_lm + i L_l-m`, a pixel that
 /// takes T of the light has `c_m = Σ_l T_lm conj(L_lm)`.
-pub fn terms_of(light: &ShLight) -> Vec<CurveTerms> {
+pub(super) fn terms_of(light: &ShLight) -> Vec<CurveTerms> {
     let light = light.with_order(TurnView::ORDER);
     let light = light.coefficients();
     let mut terms = vec![[[0.0; 3]; CURVE_TERMS]; light.len()];

@@ -34,8 +34,6 @@ pub struct TurnViewRecipe {
 /// harmonics in the table's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TurnView {
-    /// Width and height, pixels.
-    pub size: u32,
     /// The camera over the plate, radians.
     pub elevation: f32,
     /// [`Self::BASE`] planes.
@@ -89,7 +87,6 @@ impl TurnViewRecipe {
             seen.finish_planes(&finish, library)
         });
         TurnView {
-            size: self.size,
             elevation: stand.elevation(),
             finishes: finishes.collect(),
             base,

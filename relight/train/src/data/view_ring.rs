@@ -83,12 +83,52 @@ impl ViewWindow {
     pub(super) fn view_of(self, sample: u64, seed: u64) -> u64 {
         let batch = self.batch;
         let first = self.oldest + (sample + batch - self.oldest % batch) % batch;
-        let count = self.end.saturating_sub(first).div_ceil(batch).max(1);
+        debug_assert!(self.end - self.oldest >= batch);
+        let count = (self.end - first).div_ceil(batch);
         first + batch * (seed % count)
     }
 
     /// Where a view of this process lies in a ring of so many.
     pub(super) fn place(self, view: u64, ring: usize) -> usize {
-        (view / u64::from(self.rank.world_size())) as usize % ring.max(1)
+        (view / u64::from(self.rank.world_size())) as usize % ring
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn samples_are_of_views_that_are_there_of_their_own_process_and_each_has_its_place() {
+        for (views, batch, processes, new_views) in [
+            (8_u64, 4_u64, 1_u32, 1_u64),
+            (13, 4, 2, 3),
+            (12, 12, 3, 40),
+            (31, 8, 4, 0),
+        ] {
+            for step in 0..20 {
+                let end = batch + new_views * step;
+                for index in 0..processes {
+                    let window = ViewWindow {
+                        oldest: end.saturating_sub(views),
+                        end,
+                        batch,
+                        rank: Rank::new(index, processes).unwrap(),
+                    };
+                    let ring = (views.div_ceil(u64::from(processes)) + 1) as usize;
+                    let own = |view: &u64| view % u64::from(processes) == u64::from(index);
+                    let kept: Vec<u64> = (window.oldest..end).filter(own).collect();
+                    let places: BTreeSet<usize> =
+                        kept.iter().map(|&view| window.place(view, ring)).collect();
+                    assert_eq!(places.len(), kept.len());
+                    for sample in window.samples() {
+                        for seed in 0..9 {
+                            assert!(kept.contains(&window.view_of(sample, seed)));
+                        }
+                    }
+                }
+            }
+        }
     }
 }

@@ -320,7 +320,11 @@ impl<'a> Run<'a> {
             figures,
             sheet,
             damage,
-        } = self.task.validate()?;
+        } = match self.task.validate() {
+            // The next step sees that, too, and all processes stop after it.
+            Err(TrainError::Stopped) => return Ok(BTreeMap::new()),
+            made => made?,
+        };
         if let Some(damage) = damage {
             self.damaged = true;
             observer.damaged(self.step, &damage);

@@ -8,6 +8,8 @@ use super::{ensure, within};
 use crate::error::TrainError;
 
 const MAX_VIEWS: u64 = 1_000_000;
+// They stay in the device's memory, 5 MB each of 128 x 128.
+const MAX_VALIDATION: u64 = 4096;
 
 /// Views of objects on the table and rooms around them: the table `[data]` of `relight train turn`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,7 +73,7 @@ impl TransferSettings {
         )?;
         within("data.views", self.views, 1..=MAX_VIEWS)?;
         within("data.first_views", self.first_views, 1..=self.views)?;
-        within("data.validation", self.validation, 1..=MAX_VIEWS)?;
+        within("data.validation", self.validation, 1..=MAX_VALIDATION)?;
         within("data.new_views", self.new_views, 0..=MAX_VIEWS)?;
         within("data.rays", self.rays, 16..=4096)?;
         within("data.variants", self.variants, 1..=1000)

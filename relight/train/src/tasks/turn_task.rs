@@ -48,10 +48,10 @@ impl TurnNetworkTask {
         settings.check()?;
         let graph = turn_network();
         let trainable = Trainable::new(graph, weights, &settings.run, resources.device)?;
-        let data = &settings.data;
+        let (data, kind) = (&settings.data, settings.run.precision.kind());
         Ok(Self {
-            training: Turns::for_training(data, settings.run.seed, resources.clone())?,
-            validation: Turns::for_validation(data, resources)?,
+            training: Turns::for_training(data, (settings.run.seed, kind), resources.clone())?,
+            validation: Turns::for_validation(data, kind, resources)?,
             settings,
             trainable,
             validated: Vec::new(),
@@ -70,10 +70,11 @@ impl TurnNetworkTask {
                 batch: end - begin,
                 seed: stream(44, begin),
             };
-            let batch = self.validation.batch(draw, count)?;
+            let batch = self.validation.batch(draw)?;
             self.validated.push(batch);
             begin = end;
         }
+        self.validation.close();
         Ok(())
     }
 }
@@ -180,7 +181,7 @@ impl TrainingTask for TurnNetworkTask {
             batch: run.batch,
             seed: stream(stream(run.seed, 43), step),
         };
-        let batch = self.training.batch(draw, data.views)?;
+        let batch = self.training.batch(draw)?;
         let output = self.trainable.model.forward(&batch.input)?;
         let (normals, log_chord) = predicted_normals(&output[0])?;
         let mut terms = LossTerms::default();

@@ -22,7 +22,7 @@ use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
 /// By what the network's expected errors are multiplied, so that four fifths of the pixels that are expected within 10 degrees
-/// are. Measured: (docs/results/turns.md).
+/// are. Measured (docs/results/turns.md).
 const CALIBRATION: f64 = 1.14;
 
 /// The network's answer for a turn, with the light: a `known` one, in the viewer's frame at the table's angle 0, of which bands

@@ -5,7 +5,7 @@
 //! is read from the curves themselves.
 
 use crate::network::limits::{
-    COLOURED, DARK, HARMONICS, MAX_LOG, MAX_RATIO, MAX_VALUE, MIN_MEAN, STRONG,
+    COLOURED, DARK, HARMONICS, LOG_SCALE, MAX_LOG, MAX_RATIO, MAX_VALUE, MIN_MEAN, SMALL, STRONG,
 };
 use num_complex::Complex32;
 use relight_photo::nets::{LOG_MEANS, TURN_INPUTS};
@@ -48,8 +48,8 @@ pub fn network_input(turn: &NetworkTurn<'_>) -> Vec<f32> {
             let square = (0..turn.pixels.len())
                 .map(|k| of(k).norm().powi(2))
                 .sum::<f32>();
-            let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + 1e-4;
-            whole.push(effective.ln() / 1.5 + 1.0);
+            let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + SMALL;
+            whole.push(effective.ln() / LOG_SCALE + 1.0);
             let value = |k: usize| up_to(of(k) * (1.0 / effective), MAX_VALUE);
             planes.push(|k| value(k).re);
             planes.push(|k| value(k).im);

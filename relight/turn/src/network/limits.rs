@@ -16,3 +16,7 @@ pub const MAX_VALUE: f32 = 4.0;
 pub const DARK: f32 = 0.1;
 /// Largest logarithm of a mean beside that of all. By hand.
 pub const MAX_LOG: f32 = 3.0;
+/// Added to effective values. Numerical.
+pub const SMALL: f32 = 1e-4;
+/// By what the logarithms of effective values are divided, so that they are about 1. By hand.
+pub const LOG_SCALE: f32 = 1.5;

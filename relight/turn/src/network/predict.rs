@@ -34,7 +34,7 @@ pub(crate) struct TurnPrediction {
 pub(crate) struct NetworkFigures {
     /// Of its answer.
     pub(crate) expected_error_deg: f32,
-    /// The least one if the table turned the other way.
+    /// The one if the table turned the other way.
     pub(crate) other_direction_deg: f32,
 }
 

@@ -2,16 +2,13 @@
 
 use relight_synth::CURVE_TERMS;
 use relight_turn::input_limits::{
-    COLOURED, DARK, HARMONICS, MAX_LOG, MAX_RATIO, MAX_VALUE, MIN_MEAN, STRONG,
+    COLOURED, DARK, HARMONICS, LOG_SCALE, MAX_LOG, MAX_RATIO, MAX_VALUE, MIN_MEAN, SMALL, STRONG,
 };
 use tch::Tensor;
 
 use super::lit::{PlannedTurn, mean_over};
 use crate::data::tensors::{columns, upload};
 use crate::error::TrainError;
-
-/// Added to effective values. Numerical.
-const SMALL: f64 = 1e-4;
 
 /// Complex numbers as two tensors.
 struct Complex {
@@ -89,8 +86,13 @@ pub(super) fn network_input(
         })?;
         let effective = mean_over(&shown.norm()?.f_square()?, mask)?
             .f_sqrt()?
-            .f_add_scalar(SMALL)?;
-        whole.push(effective.f_log()?.f_div_scalar(1.5)?.f_add_scalar(1.0)?);
+            .f_add_scalar(f64::from(SMALL))?;
+        whole.push(
+            effective
+                .f_log()?
+                .f_div_scalar(f64::from(LOG_SCALE))?
+                .f_add_scalar(1.0)?,
+        );
         let value = shown.each(|part| part.f_div(&effective))?;
         planes.push(value.up_to(MAX_VALUE)?.interleaved()?);
     }

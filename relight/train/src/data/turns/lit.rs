@@ -1,7 +1,7 @@
 //! Views in a light that turns, on the device: the curve of each pixel as `batch x terms x 3 x side x side`, before there is a
 //! camera.
 //!
-//! Each term of a curve is what a pixel shows of one light ([`relight_synth::terms_of`]):
+//! Each term of a curve is what a pixel shows of one light ([`relight_synth::TurnPlan::light`]):
 //!
 //! ```text
 //! diffuse = albedo / π (E(n) - Σ blocked_lm L_lm + mean albedo Σ bounced_lm L_lm)
@@ -22,7 +22,7 @@ use crate::data::tensors::{columns, dot, of_light, unit, upload};
 use crate::error::TrainError;
 
 /// A colour of less than this is black. Numerical.
-const MIN_ALBEDO: f64 = 1e-3;
+const BLACK: f64 = 1e-3;
 
 /// A turn to be made: the view's place in the pool, and all other parameters.
 #[derive(Debug, Clone)]
@@ -97,7 +97,7 @@ impl LitTurns {
             .f_where_self(&is_fresnel, &head_on.f_mul(&facing)?)?
             .f_mul(&part(TurnView::MIRRORS, 1)?)?
             .f_mul(&is_glossy)?;
-        let tint = mean.f_div(&mean.f_amax([1_i64], true)?.f_clamp_min(MIN_ALBEDO)?)?;
+        let tint = mean.f_div(&mean.f_amax([1_i64], true)?.f_clamp_min(BLACK)?)?;
         let is_tinted = of(|material| f32::from(u8::from(material.is_tinted)))?.f_gt(0.5)?;
         let colour = tint.f_where_self(&is_tinted, &tint.f_ones_like()?)?;
         let colour = albedo.f_where_self(&is_metal.f_gt(0.5)?, &colour)?;

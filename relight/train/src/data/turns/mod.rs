@@ -16,6 +16,7 @@ mod lit;
 mod tests;
 mod turn_pool;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -36,7 +37,7 @@ use relight_core::light::Panorama;
 use relight_core::reader::Rank;
 use relight_synth::{
     CURVE_TERMS, EnvironmentLights, Folders, Library, SkippedFile, TurnPlan, TurnView,
-    TurnViewRecipe, stream,
+    TurnViewRecipe, is_packed, stream,
 };
 
 /// Views that are drawn for training, for validation.
@@ -51,6 +52,9 @@ pub(crate) struct Turns {
     library: Arc<Library>,
     recipe: TurnViewRecipe,
     rooms: EnvironmentLights,
+    /// The most views of a batch.
+    views: u64,
+    kind: Kind,
     rank: Rank,
     resources: Resources,
     /// Opened with the first batch, at the position of its step.
@@ -93,48 +97,70 @@ pub(crate) struct TurnDraw {
 }
 
 impl Turns {
-    /// For training: the training part of the library.
+    /// For training: files of folders, and the training part of packed libraries.
     pub(crate) fn for_training(
         settings: &TransferSettings,
-        seed: u64,
+        (seed, kind): (u64, Kind),
         resources: Resources,
     ) -> Result<Self, TrainError> {
-        let panoramas = settings.panoramas.clone();
-        let library = read(settings, panoramas)?.training()?;
-        Self::new(settings, library, stream(seed, TRAINING), resources)
+        let (meshes, panoramas) = (settings.meshes.clone(), settings.panoramas.clone());
+        let library = read(meshes, panoramas)?.training()?;
+        let recipe = recipe(settings, stream(seed, TRAINING));
+        Ok(Self::new(
+            settings,
+            library,
+            recipe,
+            (settings.views, kind),
+            resources,
+        ))
     }
 
-    /// For validation: the validation part of the library, in rooms of its own, the same for all seeds.
+    /// For validation, the same for all seeds: procedural shapes and the validation part of a packed library, in the panoramas
+    /// for validation.
     pub(crate) fn for_validation(
         settings: &TransferSettings,
+        kind: Kind,
         resources: Resources,
     ) -> Result<Self, TrainError> {
-        let panoramas = settings.validation_panoramas.clone();
-        let library = read(settings, panoramas)?.validation()?;
-        Self::new(settings, library, VALIDATION, resources)
+        // Meshes of a folder are learned from.
+        let meshes = settings.meshes.clone().filter(|path| is_packed(path));
+        let library = read(meshes, settings.validation_panoramas.clone())?.validation()?;
+        let recipe = recipe(settings, VALIDATION);
+        let views = settings.validation;
+        Ok(Self::new(
+            settings,
+            library,
+            recipe,
+            (views, kind),
+            resources,
+        ))
     }
 
     fn new(
         settings: &TransferSettings,
         library: Library,
-        seed: u64,
+        recipe: TurnViewRecipe,
+        (views, kind): (u64, Kind),
         resources: Resources,
-    ) -> Result<Self, TrainError> {
+    ) -> Self {
         let panoramas: Vec<&Panorama> = (0..library.panoramas.len())
             .filter_map(|number| library.panoramas.get(number))
             .collect();
-        Ok(Self {
-            rooms: EnvironmentLights::new(&panoramas, settings.variants, seed),
-            recipe: TurnViewRecipe {
-                seed,
-                size: settings.size,
-                rays: settings.rays,
-            },
+        Self {
+            rooms: EnvironmentLights::new(&panoramas, settings.variants, recipe.seed),
+            recipe,
             library: Arc::new(library),
+            views,
+            kind,
             rank: Rank::ONLY,
             resources,
             open: None,
-        })
+        }
+    }
+
+    /// Frees what the batches so far were made from.
+    pub(crate) fn close(&mut self) {
+        self.open = None;
     }
 
     /// Unused files of the folders.
@@ -152,7 +178,7 @@ impl Turns {
     /// # Errors
     /// [`TrainError::Stopped`] if the run is asked to stop before the views are cast, [`TrainError::Fault`],
     /// [`TrainError::Torch`].
-    pub(crate) fn batch(&mut self, draw: TurnDraw, views: u64) -> Result<TurnBatch, TrainError> {
+    pub(crate) fn batch(&mut self, draw: TurnDraw) -> Result<TurnBatch, TrainError> {
         let window = ViewWindow {
             oldest: draw.oldest,
             end: draw.end,
@@ -161,7 +187,7 @@ impl Turns {
         };
         let mut open = match self.open.take() {
             Some(open) => open,
-            None => self.opened(draw.oldest, views)?,
+            None => self.opened(draw.oldest)?,
         };
         while open.loader.next_number() < draw.end {
             let place = window.place(open.loader.next_number(), open.pool.len());
@@ -189,8 +215,8 @@ impl Turns {
         Ok(batch)
     }
 
-    /// A pool of so many views, whose first is that of a number.
-    fn opened(&self, first: u64, views: u64) -> Result<OpenPool, TrainError> {
+    /// A pool whose first view is that of a number.
+    fn opened(&self, first: u64) -> Result<OpenPool, TrainError> {
         let of = u64::from(self.rank.world_size());
         // The other processes of a group wait for this one's first step.
         let stop = if self.rank == Rank::ONLY {
@@ -198,8 +224,8 @@ impl Turns {
         } else {
             Arc::default()
         };
-        let place = (Kind::Float, self.resources.device);
-        let views = views.div_ceil(of) as usize + 1;
+        let place = (self.kind, self.resources.device);
+        let views = self.views.div_ceil(of) as usize + 1;
         let pool = TurnPool::new(views, self.recipe.size, place)?;
         let (library, recipe) = (Arc::clone(&self.library), self.recipe.clone());
         let cast: Cast<TurnView> = Arc::new(move |number| recipe.cast(&library, number));
@@ -213,12 +239,17 @@ impl Turns {
     }
 }
 
-fn read(
-    settings: &TransferSettings,
-    panoramas: Option<std::path::PathBuf>,
-) -> Result<Library, TrainError> {
+fn recipe(settings: &TransferSettings, seed: u64) -> TurnViewRecipe {
+    TurnViewRecipe {
+        seed,
+        size: settings.size,
+        rays: settings.rays,
+    }
+}
+
+fn read(meshes: Option<PathBuf>, panoramas: Option<PathBuf>) -> Result<Library, TrainError> {
     Ok(Library::read(&Folders {
-        meshes: settings.meshes.clone(),
+        meshes,
         textures: None,
         panoramas,
     })?)
@@ -230,7 +261,7 @@ fn batch_of(
     seeds: &[u64],
 ) -> Result<TurnBatch, TrainError> {
     let lit = LitTurns::new(&open.pool, &open.maps, turns)?;
-    let noise = open.noise.of(seeds, Kind::Float)?;
+    let noise = open.noise.of(seeds, lit.curves.kind())?;
     let seen = filmed(lit, turns, &noise)?;
     Ok(TurnBatch {
         input: network_input(&seen.curves, &seen.mask, turns)?,

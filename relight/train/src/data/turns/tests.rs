@@ -1,4 +1,8 @@
-use relight_synth::{CurveTerms, made_panoramas, terms_of};
+use std::f64::consts::PI;
+
+use relight_core::light::{Direction, basis};
+use relight_core::render::cosine_lobe;
+use relight_synth::{CurveTerms, made_panoramas};
 use relight_turn::NetworkTurn;
 use tch::Device;
 
@@ -40,7 +44,7 @@ fn planned(count: u64) -> (OpenPool, Vec<PlannedTurn>, Vec<TurnView>) {
     (open, turns, views)
 }
 
-/// The curve of a pixel of a diffuse object in a light, by the formulas, number by number.
+/// The curve of a pixel by the formulas, number by number; `mean` is the object's mean albedo.
 fn by_formula(
     view: &TurnView,
     plan: &TurnPlan,
@@ -51,65 +55,93 @@ fn by_formula(
     let of = |plane: usize| f64::from(view.base[plane * area + pixel]);
     let finish = plan.finish * TurnView::FINISH_PLANES;
     let own = |plane: usize| f64::from(view.finishes[(finish + plane) * area + pixel]);
-    let normal = [0, 1, 2].map(own);
-    let rows = TurnView::to_table(view.elevation);
-    let [x, y, z] = rows.map(|row| {
-        (0..3)
-            .map(|axis| f64::from(row[axis]) * normal[axis])
-            .sum::<f64>()
-    });
-    let direction = relight_core::light::Direction::new(x, y, z).unwrap();
-    let harmonics = relight_core::light::basis(TurnView::ORDER, direction);
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let rows = TurnView::to_table(view.elevation).map(|row| row.map(f64::from));
+    let harmonics_at = |towards: [f64; 3]| {
+        let [x, y, z] = rows.map(|row| dot(row, towards));
+        basis(TurnView::ORDER, Direction::new(x, y, z).unwrap())
+    };
+    let (normal, eye) = ([0, 1, 2].map(own), [1, 2, 3].map(of));
+    let facing = dot(normal, eye).max(0.0);
+    let mirrored = [0, 1, 2].map(|axis| 2.0 * facing * normal[axis] - eye[axis]);
+    let (diffuse, gloss) = (harmonics_at(normal), harmonics_at(mirrored));
     let albedo: [f64; 3] = match plan.plain {
         Some(plain) => plain.map(f64::from),
         None => [3, 4, 5].map(|plane| own(plane) * f64::from(plan.brightness)),
     };
+    let material = plan.material;
+    let head_on = f64::from(material.reflectance);
+    let strength = of(TurnView::MIRRORS)
+        * match (material.is_fresnel, head_on > 0.0) {
+            (_, false) => 0.0,
+            (true, _) => head_on + (1.0 - head_on) * (1.0 - facing).powi(5),
+            (false, _) => head_on * facing,
+        };
+    let brightest = mean.into_iter().fold(0.0, f64::max);
+    let colour = [0, 1, 2].map(|c| match (material.is_metal, material.is_tinted) {
+        (true, _) => albedo[c],
+        (false, true) => mean[c] / brightest,
+        (false, false) => 1.0,
+    });
     std::array::from_fn(|term| {
         [0, 1, 2].map(|c| {
             let mut sum = 0.0;
             for (k, light) in plan.light.iter().enumerate() {
-                let lobe = relight_core::render::cosine_lobe(k.isqrt());
+                let l = k.isqrt() as f64;
                 let bounced = match k {
-                    0..9 => of(TurnView::BOUNCED + k) * mean[c] * f64::from(plan.material.bounce),
+                    0..9 => of(TurnView::BOUNCED + k) * mean[c] * f64::from(material.bounce),
                     _ => 0.0,
                 };
-                let taken = harmonics[k] * lobe - of(TurnView::BLOCKED + k) + bounced;
-                sum += taken * f64::from(light[term][c]);
+                let lobe = cosine_lobe(k.isqrt());
+                let taken = diffuse[k] * lobe - of(TurnView::BLOCKED + k) + bounced;
+                let matt = if material.is_metal {
+                    0.0
+                } else {
+                    albedo[c] / PI * taken
+                };
+                let left = (-0.5 * l * (l + 1.0) * f64::from(material.blur).powi(2)).exp();
+                let mirror = colour[c] * strength * gloss[k] * left;
+                sum += (matt + mirror) * f64::from(light[term][c]);
             }
-            sum * albedo[c] / std::f64::consts::PI
+            sum
         })
     })
 }
 
 #[test]
 fn tensors_light_turns_as_the_formulas_do_one_by_one() {
-    let (open, mut turns, views) = planned(24);
-    for turn in &mut turns {
-        turn.plan.material.is_metal = false;
-        turn.plan.material.reflectance = 0.0;
-    }
+    let (open, turns, views) = planned(60);
     let lit = LitTurns::new(&open.pool, &open.maps, &turns).unwrap();
     let means = lit::mean_over(&lit.albedo, &lit.mask).unwrap();
-    let (mut off, mut sum) = (0.0, 0.0);
+    // Matt, glossy, metal.
+    let (mut off, mut sum) = ([0.0; 3], [0.0; 3]);
     for (at, turn) in turns.iter().enumerate() {
         let view = &views[turn.place];
         let mean = [0, 1, 2].map(|c| means.double_value(&[at as i64, c, 0, 0]));
+        let material = turn.plan.material;
+        let kind = match (material.is_metal, material.reflectance > 0.0) {
+            (true, _) => 2,
+            (false, glossy) => usize::from(glossy),
+        };
         for pixel in (0..SIZE * SIZE)
             .filter(|&p| f32::from(view.base[p]) > 0.5)
-            .step_by(5)
+            .step_by(7)
         {
             let expected = by_formula(view, &turn.plan, pixel, mean);
             let (y, x) = ((pixel / SIZE) as i64, (pixel % SIZE) as i64);
             for (term, expected) in expected.iter().enumerate() {
                 for (c, expected) in expected.iter().enumerate() {
                     let place = [at as i64, term as i64, c as i64, y, x];
-                    off += (lit.curves.double_value(&place) - expected).powi(2);
-                    sum += expected.powi(2);
+                    off[kind] += (lit.curves.double_value(&place) - expected).powi(2);
+                    sum[kind] += expected.powi(2);
                 }
             }
         }
     }
-    assert!((off / sum).sqrt() < 0.01, "{off} of {sum}");
+    for (kind, most) in [(0, 0.01), (1, 0.02), (2, 0.08)] {
+        let apart: f64 = (off[kind] / sum[kind]).sqrt();
+        assert!(sum[kind] > 0.0 && apart < most, "kind {kind}: {apart}");
+    }
 }
 
 /// The covered pixels of a turn of a batch, and their curves.
@@ -206,7 +238,7 @@ fn in_a_mirror_a_turn_is_that_of_the_mirrored_object_in_the_mirrored_light() {
         };
         // x becomes -x: azimuths are counted from the other side, half a turn further.
         let expected = shown(&own, -angle).flip([-1]);
-        let found = shown(&mirrored, angle + std::f64::consts::PI);
+        let found = shown(&mirrored, angle + PI);
         let apart = (found - &expected).abs().max().double_value(&[]);
         let largest = expected.abs().max().double_value(&[]);
         assert!(apart < 1e-3 * largest, "turn {at}: {apart} of {largest}");
@@ -214,7 +246,7 @@ fn in_a_mirror_a_turn_is_that_of_the_mirrored_object_in_the_mirrored_light() {
 }
 
 #[test]
-fn clipped_curves_stay_below_white_and_unclipped_ones_as_they_are() {
+fn clipping_darkens_the_bright_pixels_of_the_turns_that_clip_and_no_others() {
     let (open, mut turns, _) = planned(6);
     for turn in &mut turns {
         turn.plan.is_mirrored = false;
@@ -236,33 +268,11 @@ fn clipped_curves_stay_below_white_and_unclipped_ones_as_they_are() {
     for at in [0, 1, 3, 4, 5] {
         assert_eq!(before.get(at), after.get(at));
     }
-    let means = |of: &Tensor| of.get(2).get(0);
-    assert!((means(&before) - means(&after)).min().double_value(&[]) > -1e-6);
-    assert!((means(&before) - means(&after)).max().double_value(&[]) > 0.0);
-}
-
-#[test]
-fn a_light_that_turns_is_the_sum_of_its_terms() {
-    let made = made_panoramas().unwrap();
-    let light = made[0].1.project(TurnView::ORDER);
-    let terms = terms_of(&light);
-    let angle = 0.7_f64;
-    let axis = relight_core::light::Direction::new(0.0, 0.0, 1.0).unwrap();
-    let turned = light.rotated(&relight_core::light::Rotation::about(axis, -angle));
-    for (k, terms) in terms.iter().enumerate() {
-        let l = k.isqrt();
-        if k.abs_diff(l * (l + 1)) > 6 {
-            continue;
-        }
-        let mut sum = f64::from(terms[0][1]);
-        for m in 1..=6 {
-            let (sin, cos) = (m as f64 * angle).sin_cos();
-            sum += f64::from(terms[2 * m - 1][1]) * cos - f64::from(terms[2 * m][1]) * sin;
-        }
-        let expected = turned.coefficients()[k][1];
-        assert!(
-            (sum - expected).abs() < 1e-4 * expected.abs().max(1.0),
-            "{k}: {sum} {expected}"
-        );
-    }
+    let mean = |of: &Tensor| of.get(2).get(0).amax([0_i64], false);
+    let cut = mean(&before) - mean(&after);
+    assert!(cut.min().double_value(&[]) > -1e-5);
+    let covered = mean(&before).gt(0.0).sum(Kind::Float).double_value(&[]);
+    let changed = cut.gt(1e-5).sum(Kind::Float).double_value(&[]) / covered;
+    // White is where three tenths of the curves can reach at most.
+    assert!((0.02..0.31).contains(&changed), "{changed}");
 }
