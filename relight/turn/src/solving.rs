@@ -7,6 +7,7 @@ use relight_core::light::ShLight;
 use relight_photo::nets::Weights;
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::Recording;
+use relit_data::shard::SessionEntry;
 
 use crate::error::TurnError;
 use crate::fit::by_network::solve_by_network;
@@ -75,6 +76,8 @@ pub struct SolvedTurn {
     pub(crate) network: NetworkFigures,
     /// The light by the ball, where there is one.
     pub ball: Option<ProbeLight>,
+    /// Why the data set says that the turn is broken, if it does.
+    pub(crate) broken: Option<String>,
     /// How long the shard took to read.
     pub reading: Duration,
 }
@@ -98,7 +101,10 @@ pub fn solve_turn(
         TurnLight::Ball { session: None, .. } => Some(recording_of(shard)?),
         TurnLight::Unknown | TurnLight::Given(_) => None,
     };
-    let rig = rig_of(shard, recording.as_ref());
+    let described = dataset_of(shard).and_then(|(dataset, _)| session_of(&dataset, shard).cloned());
+    let broken = described.as_ref().filter(|session| session.is_broken());
+    let broken = broken.map(|session| session.quality.reasons.join("; "));
+    let rig = rig_of(described.as_ref(), recording.as_ref());
     let elevation = match (options.elevation, rig.camera_elevation_deg) {
         (Some(given), _) => given,
         (None, Some(degrees)) => Elevation::from_rig(degrees)?,
@@ -131,21 +137,16 @@ pub fn solve_turn(
         solution,
         network: prediction.figures,
         ball,
+        broken,
         reading,
     })
 }
 
 /// The rig's properties: from the data set of the shard, else from the session.
-fn rig_of(shard: &Path, recording: Option<&Recording>) -> RigFacts {
+fn rig_of(described: Option<&SessionEntry>, recording: Option<&Recording>) -> RigFacts {
+    let of_dataset = described.and_then(|session| session.rig);
     let of_session = || recording?.manifest.as_ref()?.rig;
-    rig_of_dataset(shard)
-        .or_else(of_session)
-        .unwrap_or_default()
-}
-
-fn rig_of_dataset(shard: &Path) -> Option<RigFacts> {
-    let (dataset, _) = dataset_of(shard)?;
-    session_of(&dataset, shard)?.rig
+    of_dataset.or_else(of_session).unwrap_or_default()
 }
 
 fn rotation(options: &TurnOptions<'_>, rig: RigFacts) -> TableRotation {

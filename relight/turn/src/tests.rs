@@ -255,6 +255,7 @@ pub(crate) fn solved(mut turn: ReadTurn, solution: TurnSolution) -> SolvedTurn {
         solution,
         network: expecting(10.0, 20.0),
         ball: None,
+        broken: None,
         reading: Duration::ZERO,
     }
 }

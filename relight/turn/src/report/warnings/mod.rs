@@ -14,6 +14,9 @@ impl SolvedTurn {
     /// Its warnings.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.ball.iter().flat_map(of_ball).collect();
+        warnings.extend(self.broken.iter().map(|reasons| {
+            format!("the data set says that this turn is broken ({reasons}): look at its page, correct it and extract it again")
+        }));
         warnings.extend(self.of_rotation());
         warnings.extend(self.of_doubted_direction());
         let elevation = self.solution.elevation;
@@ -43,9 +46,9 @@ impl SolvedTurn {
         warnings
     }
 
-    /// Whether no frame was left out and normals and albedo are observable.
+    /// Whether no frame was left out, normals and albedo are observable, and the data set does not say that the turn is broken.
     pub fn is_whole(&self) -> bool {
-        self.turn.damage.is_empty() && self.solution.verdict().is_fit()
+        self.broken.is_none() && self.turn.damage.is_empty() && self.solution.verdict().is_fit()
     }
 
     /// For a rotation direction that was not given: it was estimated and is not the usual one, or is unknown.

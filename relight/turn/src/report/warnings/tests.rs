@@ -48,6 +48,16 @@ fn the_light_of_another_turn_damage_and_missing_angles_are_told_in_order() {
 }
 
 #[test]
+fn a_turn_that_the_data_set_calls_broken_is_not_whole() {
+    let solved = SolvedTurn {
+        broken: Some("the mask does not fit".to_owned()),
+        ..ball_solved()
+    };
+    check(&solved, &["the mask does not fit"]);
+    assert!(!solved.is_whole());
+}
+
+#[test]
 fn a_rotation_is_told_where_nobody_said_it_and_it_is_not_the_usual_one() {
     let mut solved = ball_solved();
     let (usual, other) = (RotationDirection::default(), RotationDirection::Clockwise);
