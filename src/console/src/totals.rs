@@ -18,6 +18,9 @@ pub struct RunTotals {
     since: Instant,
 }
 
+/// Shorter than this, the time left is not told in minutes.
+const SHORT: Duration = Duration::from_secs(60);
+
 impl RunTotals {
     /// Of so many recordings none is done, and the first begins now.
     pub fn new(of: u64, now: Instant) -> Self {
@@ -55,6 +58,7 @@ impl RunTotals {
         }
         let left = self.left();
         let until = match left {
+            Some(left) if done < of && left < SHORT => ", less than a minute left".to_owned(),
             Some(left) if done < of => format!(", about {} left", format_duration(left)),
             _ => String::new(),
         };

@@ -31,12 +31,17 @@ pub struct PhotoReading {
 }
 
 impl PhotoReading {
-    /// The mask of a photograph of this name: the given file, or the photograph's in the given folder.
+    /// The mask of a photograph of this name: the given file, or the photograph's in the given folder, `NAME.png` or
+    /// `NAME-mask.png`.
     pub fn mask_path(given: &Path, name: &str) -> PathBuf {
-        if given.is_dir() {
-            given.join(format!("{name}.png"))
+        if !given.is_dir() {
+            return given.to_owned();
+        }
+        let [own, suffixed] = ["", "-mask"].map(|end| given.join(format!("{name}{end}.png")));
+        if !own.is_file() && suffixed.is_file() {
+            suffixed
         } else {
-            given.to_owned()
+            own
         }
     }
 }
