@@ -27,7 +27,7 @@ pub struct TransferSettings {
     pub rays: u32,
     /// Curves of brightness of each panorama.
     pub variants: u32,
-    /// A folder of meshes, or a packed library, of which the validation part is not learned from, beside the procedural shapes.
+    /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
     /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.

@@ -88,7 +88,7 @@ pub(crate) fn solve_by_network(
         measured: known.cloned(),
         conditioning,
     };
-    solution.conditioning = conditioning.expecting(solution.expected_error_deg());
+    solution.conditioning = conditioning.expecting(solution.expected_error_deg(), material);
     Ok(solution)
 }
 
@@ -168,6 +168,8 @@ mod tests {
             let found = solve_by_network(&curves, &prediction, seen, None, (elevation(), material))
                 .unwrap();
             assert_eq!(found.material(), material);
+            let is_metal = material == MaterialKind::Metal;
+            assert_eq!(found.verdict() == TurnVerdict::Uncertain, is_metal);
             found.residual()
         };
         let (metal, diffuse) = (

@@ -10,7 +10,7 @@ pub enum TurnVerdict {
     Good,
     /// The frames cover only part of a turn.
     PartOfTurn,
-    /// Normals are expected to be far off.
+    /// Normals are expected to be far off, or the object is metal, of which little is known.
     Uncertain,
 }
 
@@ -28,8 +28,8 @@ impl TurnVerdict {
                 "the frames cover only part of a turn: do not trust normals where the confidence is low, or capture a whole turn",
             ),
             Self::Uncertain => Some(
-                "the network of turns is uncertain of the normals: do not trust them where the confidence is low; a measured light \
-                 helps (--light-ball)",
+                "the normals are uncertain, as the network expects large errors or the object is metal: do not trust them where the \
+                 confidence is low; a measured light helps (--light-ball)",
             ),
         }
     }

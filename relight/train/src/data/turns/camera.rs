@@ -24,7 +24,7 @@ pub(super) fn filmed(
     mirrored(LitTurns { curves, ..lit }, turns)
 }
 
-/// Turns of a batch of which something is planned.
+/// The numbers of those turns of a batch that ask for something; none if there are none.
 fn chosen(
     turns: &[PlannedTurn],
     is_asked: impl Fn(&PlannedTurn) -> bool,

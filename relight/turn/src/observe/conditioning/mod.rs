@@ -6,6 +6,7 @@ use relit_data::statistics::median;
 use serde::Serialize;
 
 use crate::model::harmonics::LAMBERTIAN_COEFFICIENTS;
+use crate::model::material::MaterialKind;
 use crate::observe::curves::TurnCurves;
 use crate::observe::verdict::TurnVerdict;
 
@@ -73,11 +74,12 @@ impl Conditioning {
         }
     }
 
-    /// The same where such an error of the normals is expected, degrees, the median.
-    pub(crate) fn expecting(self, expected_error_deg: f64) -> Self {
+    /// The same where such an error of the normals is expected, degrees, the median. What is expected of metal says little: it is
+    /// seldom seen in training.
+    pub(crate) fn expecting(self, expected_error_deg: f64, material: MaterialKind) -> Self {
         let verdict = if self.coverage_deg < MIN_COVERAGE_DEG {
             TurnVerdict::PartOfTurn
-        } else if expected_error_deg > MAX_EXPECTED_DEG {
+        } else if expected_error_deg > MAX_EXPECTED_DEG || material == MaterialKind::Metal {
             TurnVerdict::Uncertain
         } else {
             TurnVerdict::Good
