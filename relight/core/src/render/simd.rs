@@ -7,7 +7,9 @@
 use std::array;
 use std::ops::{Add, Div, Mul, Sub};
 
-use pulp::{Arch, WithSimd};
+#[cfg(not(target_family = "wasm"))]
+use pulp::Arch;
+use pulp::WithSimd;
 
 use crate::parallel;
 
@@ -180,14 +182,21 @@ pub(super) fn run<const I: usize, const O: usize>(
     let blocks: Vec<[&mut [f32]; O]> = (0..count)
         .map(|_| array::from_fn(|plane| parts[plane].next().unwrap_or_default()))
         .collect();
+    #[cfg(not(target_family = "wasm"))]
     let arch = Arch::new();
     parallel::for_each(blocks, |at, outputs| {
         let inputs = inputs.map(|plane| &plane[at * BLOCK..plane.len().min((at + 1) * BLOCK)]);
-        arch.dispatch(Block {
+        let block = Block {
             kernel,
             inputs,
             outputs,
-        });
+        };
+        #[cfg(not(target_family = "wasm"))]
+        arch.dispatch(block);
+        // A module of WebAssembly is compiled for one processor. `Arch` would add a version for relaxed SIMD, which not
+        // every browser has, and LLVM then uses relaxed SIMD in all functions of the same unit, such as `Gloss::new`.
+        #[cfg(target_family = "wasm")]
+        block.with_simd(pulp::Scalar);
     });
 }
 
