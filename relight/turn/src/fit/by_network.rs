@@ -25,9 +25,9 @@ use crate::observe::curves::TurnCurves;
 /// are. Measured (docs/results/turns.md).
 const CALIBRATION: f64 = 1.14;
 
-/// The network's answer for a turn, with the light: a `known` one, in the viewer's frame at the table's angle 0, of which bands
-/// up to 6 count, or the one that fits. The albedo is the mean of its answer and of what the network of photographs has `seen`;
-/// of metal in known light it follows the curves.
+/// The network's answer for a turn, with the light: a `known` one, in the viewer's frame at the table's angle 0 (bands up to 6
+/// count), or the one that fits. The albedo is the mean of its answer and of what the network of photographs has `seen`; that of
+/// metal in known light follows the curves.
 ///
 /// # Errors
 /// If the exposure was wrong, or no light fits the curves.

@@ -10,7 +10,7 @@ pub enum TurnVerdict {
     Good,
     /// The frames cover only part of a turn.
     PartOfTurn,
-    /// Normals are expected to be far off, or the object is metal, of which little is known.
+    /// Normals are expected to be far off, or the object is metal.
     Uncertain,
 }
 
