@@ -10,6 +10,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use crate::engine::task::Resources;
 use crate::error::TrainError;
 use relight_core::reader::Rank;
 
@@ -39,7 +40,7 @@ pub(super) struct ViewLoader<V> {
 
 impl<V: Send + 'static> ViewLoader<V> {
     /// Threads that cast one process's views from the number `first` on: view n is that of rank n modulo the world size.
-    /// `stop` ends waiting for one.
+    /// Where the run is asked to stop, waiting for one ends.
     ///
     /// # Errors
     /// [`TrainError::Io`].
@@ -47,10 +48,15 @@ impl<V: Send + 'static> ViewLoader<V> {
         cast: &Cast<V>,
         rank: Rank,
         first: u64,
-        threads: usize,
-        stop: Arc<AtomicBool>,
+        resources: &Resources,
     ) -> Result<Self, TrainError> {
-        let count = threads.max(1);
+        // The other processes of a group wait for this one's first step.
+        let stop = if rank == Rank::ONLY {
+            Arc::clone(&resources.stop)
+        } else {
+            Arc::default()
+        };
+        let count = resources.workers.max(1);
         let (index, stride) = (u64::from(rank.index()), u64::from(rank.world_size()));
         let first = first + (index + stride - first % stride) % stride;
         let mut loader = Self {

@@ -5,6 +5,7 @@ use tch::{Device, Kind, Tensor};
 use super::tensors::indices;
 use crate::error::TrainError;
 use relight_core::reader::Rank;
+use relight_synth::stream;
 
 /// Planes of views, in half precision.
 #[derive(Debug)]
@@ -71,8 +72,23 @@ pub(super) struct ViewWindow {
 }
 
 impl ViewWindow {
+    /// How many views of a process a ring needs room for, of so many of all processes.
+    pub(super) fn ring(views: u64, rank: Rank) -> usize {
+        views.div_ceil(u64::from(rank.world_size())) as usize + 1
+    }
+
+    /// Of each sample of this process its seed, and where its view lies in a ring of so many.
+    pub(super) fn draw(self, seed: u64, ring: usize) -> (Vec<u64>, Vec<usize>) {
+        let one = |sample: u64| {
+            let seed = stream(seed, sample);
+            let view = self.view_of(sample, stream(seed, 0));
+            (seed, self.place(view, ring))
+        };
+        self.samples().map(one).unzip()
+    }
+
     /// The samples of this process.
-    pub(super) fn samples(self) -> impl Iterator<Item = u64> {
+    fn samples(self) -> impl Iterator<Item = u64> {
         let rank = self.rank;
         let is_own =
             move |sample: &u64| sample % u64::from(rank.world_size()) == u64::from(rank.index());
@@ -80,7 +96,7 @@ impl ViewWindow {
     }
 
     /// The view of a sample, drawn by a seed.
-    pub(super) fn view_of(self, sample: u64, seed: u64) -> u64 {
+    fn view_of(self, sample: u64, seed: u64) -> u64 {
         let batch = self.batch;
         let first = self.oldest + (sample + batch - self.oldest % batch) % batch;
         debug_assert!(self.end - self.oldest >= batch);
@@ -116,7 +132,7 @@ mod tests {
                         batch,
                         rank: Rank::new(index, processes).unwrap(),
                     };
-                    let ring = (views.div_ceil(u64::from(processes)) + 1) as usize;
+                    let ring = ViewWindow::ring(views, window.rank);
                     let own = |view: &u64| view % u64::from(processes) == u64::from(index);
                     let kept: Vec<u64> = (window.oldest..end).filter(own).collect();
                     let places: BTreeSet<usize> =

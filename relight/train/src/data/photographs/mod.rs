@@ -147,14 +147,7 @@ impl Photographs {
             let place = window.place(open.loader.next_number(), open.pool.len());
             open.pool.put(place, open.loader.next_view()?)?;
         }
-        let (seeds, places): (Vec<u64>, Vec<usize>) = window
-            .samples()
-            .map(|sample| {
-                let seed = stream(stream(self.seed, step), sample);
-                let view = window.view_of(sample, stream(seed, 0));
-                (seed, window.place(view, open.pool.len()))
-            })
-            .unzip();
+        let (seeds, places) = window.draw(stream(self.seed, step), open.pool.len());
         let (rooms, lamps) = (&self.rooms, open.pool.lamps());
         let photos: Vec<PlannedPhoto> = seeds
             .par_iter()
@@ -177,21 +170,13 @@ impl Photographs {
 
     /// A pool whose first view is that of a number.
     fn opened(&self, first: u64) -> Result<OpenPool, TrainError> {
-        let of = u64::from(self.rank.world_size());
-        // The other processes of a group wait for this one's first step.
-        let stop = if self.rank == Rank::ONLY {
-            Arc::clone(&self.resources.stop)
-        } else {
-            Arc::default()
-        };
         let device = self.resources.device;
-        let views = self.data.views.div_ceil(of) as usize + 1;
+        let views = ViewWindow::ring(self.data.views, self.rank);
         let pool = ViewPool::new(views, self.data.size, (self.kind, device))?;
         let (library, recipe) = (Arc::clone(&self.library), self.recipe.clone());
         let cast: Cast<PhotoView> = Arc::new(move |number| recipe.cast(&library, number));
-        let workers = self.resources.workers;
         Ok(OpenPool {
-            loader: ViewLoader::start(&cast, self.rank, first, workers, stop)?,
+            loader: ViewLoader::start(&cast, self.rank, first, &self.resources)?,
             maps: DirectionMaps::new(PhotoView::ORDER, (self.kind, device))?,
             noise: NoiseTiles::new((3, pool.side()), self.seed, device)?,
             pool,

@@ -193,14 +193,7 @@ impl Turns {
             let place = window.place(open.loader.next_number(), open.pool.len());
             open.pool.put(place, &open.loader.next_view()?)?;
         }
-        let (seeds, places): (Vec<u64>, Vec<usize>) = window
-            .samples()
-            .map(|sample| {
-                let seed = stream(draw.seed, sample);
-                let view = window.view_of(sample, stream(seed, 0));
-                (seed, window.place(view, open.pool.len()))
-            })
-            .unzip();
+        let (seeds, places) = window.draw(draw.seed, open.pool.len());
         let (rooms, elevations) = (&self.rooms, open.pool.elevations());
         let turns: Vec<PlannedTurn> = seeds
             .par_iter()
@@ -217,21 +210,14 @@ impl Turns {
 
     /// A pool whose first view is that of a number.
     fn opened(&self, first: u64) -> Result<OpenPool, TrainError> {
-        let of = u64::from(self.rank.world_size());
-        // The other processes of a group wait for this one's first step.
-        let stop = if self.rank == Rank::ONLY {
-            Arc::clone(&self.resources.stop)
-        } else {
-            Arc::default()
-        };
         let place = (self.kind, self.resources.device);
-        let views = self.views.div_ceil(of) as usize + 1;
+        let views = ViewWindow::ring(self.views, self.rank);
         let pool = TurnPool::new(views, self.recipe.size, place)?;
         let (library, recipe) = (Arc::clone(&self.library), self.recipe.clone());
         let cast: Cast<TurnView> = Arc::new(move |number| recipe.cast(&library, number));
         let planes = (3 * (CURVE_TERMS - 1)) as i64;
         Ok(OpenPool {
-            loader: ViewLoader::start(&cast, self.rank, first, self.resources.workers, stop)?,
+            loader: ViewLoader::start(&cast, self.rank, first, &self.resources)?,
             maps: DirectionMaps::new(TurnView::ORDER, place)?,
             noise: NoiseTiles::new((planes, pool.side()), self.recipe.seed, place.1)?,
             pool,

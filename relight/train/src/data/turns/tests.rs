@@ -35,8 +35,13 @@ fn planned(count: u64) -> (OpenPool, Vec<PlannedTurn>, Vec<TurnView>) {
         })
         .collect();
     let cast: Cast<TurnView> = Arc::new(move |number| recipe.cast(&library, number));
+    let resources = Resources {
+        device: Device::Cpu,
+        workers: 1,
+        stop: Arc::default(),
+    };
     let open = OpenPool {
-        loader: ViewLoader::start(&cast, Rank::ONLY, 3, 1, Arc::default()).unwrap(),
+        loader: ViewLoader::start(&cast, Rank::ONLY, 3, &resources).unwrap(),
         pool,
         maps: DirectionMaps::new(TurnView::ORDER, place).unwrap(),
         noise: NoiseTiles::new((36, SIZE as i64), 1, Device::Cpu).unwrap(),
