@@ -6,8 +6,9 @@
 //! and leave an [`Events`] bit; the others wait for [`Board::receive`]. The interrupt of the
 //! emergency-stop input calls [`Stepper::emergency`].
 //!
-//! Knows the stepper, and nothing of lines, settings or states.
+//! Knows the stepper and real-time bytes, and nothing of lines, settings or states.
 
+use crate::realtime::Realtime;
 use crate::stepper::Stepper;
 
 /// A chip with a step timer, a serial line, a few pins and an EEPROM.
@@ -104,6 +105,20 @@ impl Events {
     /// Takes all events out and leaves none.
     pub fn take(&mut self) -> Events {
         core::mem::take(self)
+    }
+}
+
+/// What a real-time byte leaves for the main loop.
+impl From<Realtime> for Events {
+    fn from(realtime: Realtime) -> Events {
+        match realtime {
+            Realtime::Status => Events::STATUS,
+            Realtime::Hold => Events::HOLD,
+            Realtime::Resume => Events::RESUME,
+            Realtime::Reset => Events::RESET,
+            Realtime::JogCancel => Events::JOG_CANCEL,
+            Realtime::Ignored => Events::NONE,
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! Real-time bytes take effect in the receive interrupt, however full the buffer is.
 
 use rig_firmware::board::Events;
-use rig_firmware::realtime::{Realtime, Received, classify};
+use rig_firmware::realtime::{Received, classify};
 
 use crate::common::{EVENTS, STEPPER};
 use crate::masked::{Masked, Shared};
@@ -120,21 +120,10 @@ fn take_in(byte: u8, status: u8, masked: &mut Masked) -> Events {
         }
         Received::Realtime(realtime) => {
             STEPPER.lend(masked).obey(realtime);
-            events.insert(event(realtime));
+            events.insert(realtime.into());
         }
     }
     events
-}
-
-fn event(realtime: Realtime) -> Events {
-    match realtime {
-        Realtime::Status => Events::STATUS,
-        Realtime::Hold => Events::HOLD,
-        Realtime::Resume => Events::RESUME,
-        Realtime::Reset => Events::RESET,
-        Realtime::JogCancel => Events::JOG_CANCEL,
-        Realtime::Ignored => Events::NONE,
-    }
 }
 
 /// There is room for a byte to be sent.

@@ -1,6 +1,7 @@
 //! One frame as a camera delivered it, and what can be wrong with it.
 
 use relit_data::session::FrameClock;
+use relit_data::still::jpeg;
 use relit_video::PixelFormat;
 
 use super::format::Fourcc;
@@ -113,40 +114,10 @@ fn jpeg_fault(data: &[u8], width: u32, height: u32) -> Option<FrameFault> {
     if !data.windows(2).rev().any(|pair| pair == [0xff, 0xd9]) {
         return Some(FrameFault::NoEnd);
     }
-    match jpeg_size(data) {
+    match jpeg::size(data) {
         Some(found) if found == (width, height) => None,
         Some((width, height)) => Some(FrameFault::OtherSize { width, height }),
         None => Some(FrameFault::NoStart),
-    }
-}
-
-/// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` if there is
-/// no frame header before the first scan.
-fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
-    let mut at = 2;
-    loop {
-        let &[marker, code] = data.get(at..)?.first_chunk()?;
-        if marker != 0xff {
-            return None;
-        }
-        match code {
-            // Fill bytes before a marker.
-            0xff => at += 1,
-            // Markers that stand alone.
-            0x01 | 0xd0..=0xd8 => at += 2,
-            // Frame headers; 0xc4, 0xc8 and 0xcc in this range are none.
-            0xc0..=0xcf if !matches!(code, 0xc4 | 0xc8 | 0xcc) => {
-                let header: &[u8; 9] = data.get(at..)?.first_chunk()?;
-                let number =
-                    |high: usize| u32::from(header[high]) << 8 | u32::from(header[high + 1]);
-                return Some((number(7), number(5)));
-            }
-            0xda | 0xd9 | 0x00 => return None,
-            _ => {
-                let &[_, _, high, low] = data.get(at..)?.first_chunk()?;
-                at += 2 + usize::from(u16::from_be_bytes([high, low]));
-            }
-        }
     }
 }
 

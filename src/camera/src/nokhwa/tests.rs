@@ -12,10 +12,6 @@ use ::nokhwa::utils::{
     ApiBackend, CameraControl, CameraInfo, ControlValueSetter, FrameFormat, KnownCameraControl,
 };
 
-use proptest::collection::vec;
-use proptest::prelude::*;
-
-use super::worker::jpeg_length;
 use super::*;
 use crate::Mode;
 use relit_data::causes::with_causes;
@@ -281,27 +277,4 @@ fn a_number_that_is_no_camera_is_told() {
     assert!(matches!(error, CameraError::Refused { .. }), "{error:?}");
     assert!(text.contains("nokhwa:4000000"), "{text}");
     assert!(text.contains("No such file"), "{text}");
-}
-
-#[test]
-fn what_stands_behind_a_jpeg_is_not_part_of_it() {
-    // Start, a table, a scan with stuffed bytes and a restart marker, end.
-    let jpeg = [
-        0xff, 0xd8, 0xff, 0xdb, 0, 3, 9, 0xff, 0xff, 0xda, 0, 2, 7, 0xff, 0, 9, 0xff, 0xd3, 8,
-        0xff, 0xd9,
-    ];
-    for behind in [&[][..], &[0; 40], &jpeg, &[0xff, 0xd9]] {
-        let data = [&jpeg[..], behind].concat();
-        assert_eq!(jpeg_length(&data), Some(jpeg.len()), "{behind:?}");
-    }
-    for cut in 0..jpeg.len() {
-        assert_eq!(jpeg_length(&jpeg[..cut]), None, "cut to {cut}");
-    }
-}
-
-proptest! {
-    #[test]
-    fn no_bytes_have_a_jpeg_longer_than_they_are(data in vec(any::<u8>(), 0..80)) {
-        prop_assert!(jpeg_length(&data).is_none_or(|length| length <= data.len()));
-    }
 }

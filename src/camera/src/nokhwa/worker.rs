@@ -18,6 +18,7 @@ use super::fourcc;
 use crate::{CameraError, Fourcc, Frame};
 use relit_data::clock::Clock;
 use relit_data::session::FrameClock;
+use relit_data::still::jpeg;
 
 /// Longest wait for a job.
 const ANSWERING: Duration = Duration::from_secs(10);
@@ -216,7 +217,7 @@ impl Stream {
     fn frame(&self, data: &[u8], t_us: i64) -> Frame {
         // With V4L2, the library returns the whole buffer: after a JPEG follow older data.
         let used = match self.format.format() {
-            FrameFormat::MJPEG => jpeg_length(data).unwrap_or(data.len()),
+            FrameFormat::MJPEG => jpeg::length(data).unwrap_or(data.len()),
             _ => data.len(),
         };
         Frame {
@@ -229,24 +230,5 @@ impl Stream {
             clock: FrameClock::Host,
             flagged: false,
         }
-    }
-}
-
-/// The length in bytes of the JPEG at the start of `data`; `None` if its end is missing.
-pub(super) fn jpeg_length(data: &[u8]) -> Option<usize> {
-    let mut at = 2;
-    loop {
-        let &[marker, code] = data.get(at..)?.first_chunk()?;
-        at += match (marker, code) {
-            (0xff, 0xd9) => return Some(at + 2),
-            (0xff, 0xff) => 1,
-            // Values that look like a marker, and markers that stand alone.
-            (0xff, 0x00 | 0x01 | 0xd0..=0xd8) => 2,
-            (0xff, _) => {
-                let &[_, _, high, low] = data.get(at..)?.first_chunk()?;
-                2 + usize::from(u16::from_be_bytes([high, low]))
-            }
-            _ => data[at..].iter().position(|&byte| byte == 0xff)?,
-        };
     }
 }

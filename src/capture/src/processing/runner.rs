@@ -1,11 +1,11 @@
 //! The thread that has the programs do the work, one after the other, while the rig rests.
 
-use std::fs;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use relit_data::session::{MANIFEST_FILE, Manifest, Status};
+use relit_data::causes::with_causes;
+use relit_data::session::{Manifest, Status};
 
 use super::child::Worker;
 use super::commands::StepPlaces;
@@ -130,7 +130,7 @@ fn begin(shared: &Shared) -> Option<Running> {
 
 fn start(shared: &Shared, begun: &ProcessingJob) -> Result<Worker, String> {
     let session = shared.root.join(&begun.session);
-    let is_aborted = is_aborted(&session).map_err(|why| format!("{}: {why}", begun.session))?;
+    let manifest = Manifest::read(&session).map_err(|error| with_causes(&error))?;
     let (programs, dataset) = {
         let plan = shared.plan();
         (plan.programs.clone(), shared.dataset.clone())
@@ -138,19 +138,12 @@ fn start(shared: &Shared, begun: &ProcessingJob) -> Result<Worker, String> {
     let places = StepPlaces {
         session,
         dataset,
-        is_aborted,
+        is_aborted: matches!(manifest.status, Status::Aborted(_)),
     };
     let command = programs.command(begun.step, &places);
     let command = command.ok_or("its program is not installed on this machine")?;
     let program = command.get_program().to_string_lossy().into_owned();
     Worker::start(command).map_err(|error| format!("{program} could not be started: {error}"))
-}
-
-fn is_aborted(session: &std::path::Path) -> Result<bool, String> {
-    let bytes = fs::read(session.join(MANIFEST_FILE))
-        .map_err(|error| format!("the session is gone: {error}"))?;
-    let manifest = Manifest::from_json(&bytes)?;
-    Ok(matches!(manifest.status, Status::Aborted(_)))
 }
 
 /// Hears the program, holds or ends it, and notes its end.

@@ -288,10 +288,7 @@ pub(super) fn read_names(root: &Path) -> io::Result<Vec<String>> {
 }
 
 fn read_manifest(folder: &Path) -> Result<Manifest, String> {
-    let bytes = fs::read(folder.join(MANIFEST_FILE))
-        .map_err(|error| format!("its {MANIFEST_FILE} cannot be read: {error}"))?;
-    Manifest::from_json(&bytes)
-        .map_err(|fault| format!("its {MANIFEST_FILE} is not usable: {fault}"))
+    Manifest::read(folder).map_err(|error| with_causes(&error))
 }
 
 /// The frame index of a session that has ended. A damaged one counts as none: the programs that need it

@@ -118,7 +118,7 @@ impl Default for Advice {
 impl Advice {
     pub(super) fn from_state(state: &RigState) -> Self {
         if !state.rests() {
-            return Self::stopping(doing(state.phase));
+            return Self::stopping(&capitalised(&state.phase.to_string()));
         }
         match &state.obstacle_to_take() {
             Some(alarm) if alarm.is_alarm() => Self::against(alarm),
@@ -132,7 +132,7 @@ impl Advice {
         let (text, action) = obstacle.button.unwrap_or((obstacle.headline, None));
         Self {
             headline: obstacle.headline.to_owned(),
-            explanation: Some(capitalised(&obstacle.why)),
+            explanation: Some(sentence(&obstacle.why)),
             button: AdvisedButton {
                 text: text.to_owned(),
                 action,
@@ -178,7 +178,7 @@ impl Advice {
         };
         Self {
             headline: format!("The take of {object} was {how}"),
-            explanation: take.reason.as_deref().map(capitalised),
+            explanation: take.reason.as_deref().map(sentence),
             button: AdvisedButton {
                 text: format!("Record {object} again"),
                 action: Some(AdvisedAction::Again),
@@ -267,34 +267,24 @@ fn is_aborted(take: &TakeSummary) -> bool {
     take.verdict == Verdict::Aborted
 }
 
-/// What the rig is doing, for its page.
-fn doing(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "Ready",
-        Phase::Preflight => "Checking camera, table and disk",
-        Phase::MovingBack => "Moving back for the run-up",
-        Phase::Starting => "Speeding up",
-        Phase::Recording => "Recording",
-        Phase::Unwinding => "Turning back",
-        Phase::Checking => "Checking the take",
-    }
-}
-
 /// A speed as people read it.
 fn rounded(degrees_per_second: f64) -> f64 {
     (degrees_per_second * 1000.0).round() / 1000.0
 }
 
-/// The sentence as it begins a line.
-fn capitalised(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    let first = letters.next().map(char::to_uppercase);
-    let mut text: String = first.into_iter().flatten().collect();
-    text.push_str(letters.as_str());
+/// As a sentence by itself.
+fn sentence(text: &str) -> String {
+    let mut text = capitalised(text);
     if !text.ends_with(['.', '!', '?']) {
         text.push('.');
     }
     text
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(char::to_uppercase);
+    first.into_iter().flatten().chain(letters).collect()
 }
 
 #[cfg(test)]
@@ -303,8 +293,8 @@ mod tests {
 
     #[test]
     fn sentences_begin_large_and_end() {
-        assert_eq!(capitalised("öl is low"), "Öl is low.");
-        assert_eq!(capitalised("it is so."), "It is so.");
-        assert_eq!(capitalised(""), ".");
+        assert_eq!(sentence("öl is low"), "Öl is low.");
+        assert_eq!(sentence("it is so."), "It is so.");
+        assert_eq!(sentence(""), ".");
     }
 }

@@ -30,10 +30,10 @@ impl fmt::Display for Phase {
         f.write_str(match self {
             Self::Idle => "ready",
             Self::Preflight => "checking camera, table and disk",
-            Self::MovingBack => "the table moves back for the run-up",
-            Self::Starting => "the table speeds up",
+            Self::MovingBack => "moving back for the run-up",
+            Self::Starting => "speeding up",
             Self::Recording => "recording",
-            Self::Unwinding => "the table turns back",
+            Self::Unwinding => "turning back",
             Self::Checking => "checking the take",
         })
     }

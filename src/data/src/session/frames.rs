@@ -4,8 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::unmarked;
 
-/// Largest plausible angle, degrees: some thousands of turns in either direction.
-const MAX_DEGREES: f64 = 1e6;
+/// Whether a table can have an angle, degrees: within some thousands of turns in either direction.
+pub fn is_possible_angle(angle: &f64) -> bool {
+    (-1e6..=1e6).contains(angle)
+}
 
 /// One frame as it was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -101,7 +103,7 @@ impl FrameIndex {
             .filter(|entry| entry.angle_deg.is_none())
         {
             let found = angle(entry.t_us);
-            entry.angle_deg = found.filter(|angle| (-MAX_DEGREES..=MAX_DEGREES).contains(angle));
+            entry.angle_deg = found.filter(is_possible_angle);
             any |= entry.angle_deg.is_some();
         }
         any
@@ -114,11 +116,10 @@ impl FrameIndex {
     pub fn push(&mut self, entry: FrameEntry) -> Result<(), String> {
         let (n, sequence, t_us) = (entry.n, entry.sequence, entry.t_us);
         let expected = self.entries.len() as u64;
-        let reaches = |angle: &f64| (-MAX_DEGREES..=MAX_DEGREES).contains(angle);
         let last = self.entries.last();
         let what = if n != expected {
             format!("says n = {n}, but {expected} was expected")
-        } else if !entry.angle_deg.as_ref().is_none_or(reaches) {
+        } else if !entry.angle_deg.as_ref().is_none_or(is_possible_angle) {
             "has an angle that no turntable reaches".to_owned()
         } else if let Some(last) = last.filter(|last| sequence <= last.sequence) {
             let previous = last.sequence;

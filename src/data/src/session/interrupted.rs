@@ -5,9 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::writer::{close, keep_backup, write_index};
-use super::{
-    FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status, TurnJournal,
-};
+use super::{FrameIndex, INDEX_FILE, Manifest, SessionError, SessionLock, Status, TurnJournal};
 
 /// A session that is marked as recording although its recorder has died. It stays locked while this
 /// value lives.
@@ -30,10 +28,7 @@ impl InterruptedSession {
     /// [`SessionError::Unusable`], or [`SessionError::Io`].
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let lock = SessionLock::acquire(folder)?;
-        let path = folder.join(MANIFEST_FILE);
-        let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
-        let manifest =
-            Manifest::from_json(&bytes).map_err(|fault| SessionError::manifest(&path, &fault))?;
+        let manifest = Manifest::read(folder)?;
         if manifest.status != Status::Recording {
             lock.remove()?;
             return Err(SessionError::Ended(folder.to_owned()));

@@ -1,12 +1,14 @@
 //! The manifest: `session.json`, schema `relit.session/1`.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::is_session_name;
+use super::{MANIFEST_FILE, SessionError, is_session_name};
 use crate::rig::{CAMERA_ELEVATIONS_DEG, RigFacts};
 use crate::text;
 
@@ -159,6 +161,16 @@ pub struct SoftwareFacts {
 }
 
 impl Manifest {
+    /// Reads the manifest of a session folder.
+    ///
+    /// # Errors
+    /// [`SessionError::Io`], or [`SessionError::Unusable`].
+    pub fn read(folder: &Path) -> Result<Self, SessionError> {
+        let path = folder.join(MANIFEST_FILE);
+        let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
+        Self::from_json(&bytes).map_err(|fault| SessionError::manifest(&path, &fault))
+    }
+
     /// Reads a manifest from the bytes of its file.
     ///
     /// # Errors

@@ -25,7 +25,7 @@ mod writer;
 pub use crate::naming::is_session_name;
 pub use annotations::annotate;
 pub use error::SessionError;
-pub use frames::{FrameEntry, FrameIndex, Gap};
+pub use frames::{FrameEntry, FrameIndex, Gap, is_possible_angle};
 pub use interrupted::InterruptedSession;
 pub use journal::{JOURNAL_FILE, TurnJournal};
 use lock::SessionLock;

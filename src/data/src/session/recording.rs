@@ -79,10 +79,7 @@ impl Recording {
     }
 
     fn open_session(folder: &Path) -> Result<Self, SessionError> {
-        let manifest_path = folder.join(MANIFEST_FILE);
-        let bytes = fs::read(&manifest_path).map_err(SessionError::io(&manifest_path, "read"))?;
-        let manifest = Manifest::from_json(&bytes)
-            .map_err(|fault| SessionError::manifest(&manifest_path, &fault))?;
+        let manifest = Manifest::read(folder)?;
         let mut notices = Vec::new();
         match &manifest.status {
             Status::Complete => {}
@@ -279,10 +276,9 @@ pub fn recording_name(path: &Path) -> String {
     if !path.is_dir() {
         return name_from(path.file_stem());
     }
-    let manifest = fs::read(path.join(MANIFEST_FILE)).ok();
-    match manifest.and_then(|bytes| Manifest::from_json(&bytes).ok()) {
-        Some(manifest) => manifest.id,
-        None => {
+    match Manifest::read(path) {
+        Ok(manifest) => manifest.id,
+        Err(_) => {
             let real = path.canonicalize();
             name_from(real.as_deref().unwrap_or(path).file_name())
         }

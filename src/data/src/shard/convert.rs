@@ -11,7 +11,7 @@ use super::codec::{decode_mask, decode_rgb};
 use super::combine::bytes_of;
 use super::dataset::{Dataset, SessionEntry, ShardEntry};
 use super::digest::Hashing;
-use super::file::compare;
+use super::file::{changed, compare};
 use super::names::{self, Part, parse_member};
 use super::new_dataset::{FolderImages, NewDataset};
 use super::output;
@@ -283,12 +283,5 @@ impl SessionWriting<'_, '_> {
                 Err(changed(&self.conversion.shard.file, what))
             }
         }
-    }
-}
-
-fn changed(file: &str, what: String) -> ShardError {
-    ShardError::Changed {
-        file: file.to_owned(),
-        what,
     }
 }

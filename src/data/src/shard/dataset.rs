@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
-use super::file::FileEntry;
+use super::file::{FileEntry, read_limited};
 use super::quality::{QualityVerdict, SessionQuality};
 use super::settings::ExtractionSettings;
 use super::{ShardError, names, output};
@@ -206,7 +206,7 @@ impl Dataset {
     /// [`ShardError::Io`].
     pub fn read(out: &Path) -> Result<Self, ShardError> {
         let path = out.join(Self::FILE);
-        let bytes = read_limited(&path).map_err(|error| match error.kind() {
+        let bytes = read_limited(&path, MAX_BYTES).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => ShardError::NoDataset(out.to_owned()),
             _ => ShardError::io("read", &path)(error),
         })?;
@@ -351,14 +351,4 @@ pub(super) fn json_of(value: &impl Serialize, file: &str) -> Result<Vec<u8>, Sha
         json.map_err(|error| ShardError::Refused(format!("could not write {file}: {error}")))?;
     bytes.push(b'\n');
     Ok(bytes)
-}
-
-fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
-    let length = std::fs::metadata(path)?.len();
-    if length > MAX_BYTES {
-        return Err(io::Error::other(format!(
-            "it has {length} bytes, more than the limit of {MAX_BYTES}"
-        )));
-    }
-    std::fs::read(path)
 }

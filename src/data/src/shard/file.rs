@@ -1,5 +1,7 @@
 //! The files of a data set as `dataset.json` lists them, and whether they are still as it says.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -61,7 +63,19 @@ pub(super) fn compare(
     Err(changed(file, what))
 }
 
-fn changed(file: &str, what: String) -> ShardError {
+/// The content of a file of at most `limit` bytes.
+pub(super) fn read_limited(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let length = File::open(path)?.take(limit + 1).read_to_end(&mut bytes)?;
+    if length as u64 > limit {
+        let what = format!("it has more than {limit} bytes");
+        return Err(io::Error::other(what));
+    }
+    Ok(bytes)
+}
+
+/// That something in the data set is not what its description says.
+pub(super) fn changed(file: &str, what: String) -> ShardError {
     ShardError::Changed {
         file: file.to_owned(),
         what,

@@ -19,7 +19,7 @@ const STAND_IN: usize = 64;
 /// The picture, if all of it is there. A file may lack its end marker: then the scan is whole if the picture does not
 /// depend on what follows it. `None` if a part of the picture is missing.
 pub(crate) fn whole(bytes: &[u8]) -> Option<Cow<'_, [u8]>> {
-    if has_end(bytes) {
+    if length(bytes).is_some() {
         return Some(Cow::Borrowed(bytes));
     }
     let scan = only_scan(bytes)?;
@@ -52,6 +52,14 @@ fn followed_by(scan: &[u8], bits: &[u8]) -> Vec<u8> {
 
 fn picture(bytes: &[u8]) -> ImageResult<DynamicImage> {
     ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg).decode()
+}
+
+/// Width and height as the frame's header states them (ITU-T T.81, B.2.2).
+pub fn size(bytes: &[u8]) -> Option<(u32, u32)> {
+    let (_, frame, _) = segments(bytes).find(|&(marker, ..)| is_frame(marker))?;
+    let &[_, y, yy, x, xx] = frame.first_chunk()?;
+    let number = |bytes| u32::from(u16::from_be_bytes(bytes));
+    Some((number([x, xx]), number([y, yy])))
 }
 
 /// How many components its pixels have.
@@ -90,23 +98,20 @@ fn segment(bytes: &[u8], from: usize) -> Option<(u8, &[u8], usize)> {
     Some((marker, content, after + length))
 }
 
-/// Whether a JPEG has a marker EOI of its own; those of thumbnails lie in segments, which are passed over. Where another
-/// JPEG begins the first has ended without one.
-fn has_end(bytes: &[u8]) -> bool {
+/// The length in bytes of the JPEG at the start of `bytes`, up to its own marker EOI; those of thumbnails lie in
+/// segments, which are passed over. `None` if there is none, also where another JPEG begins before it.
+pub fn length(bytes: &[u8]) -> Option<usize> {
     let mut at = 2;
-    while let Some((marker, after)) = next_marker(bytes, at) {
+    loop {
+        let (marker, after) = next_marker(bytes, at)?;
         at = match marker {
-            EOI => return true,
-            SOI => return false,
+            EOI => return Some(after),
+            SOI => return None,
             // Markers without a length, and bytes 0xff of a scan.
             0x00 | 0x01 | 0xd0..=0xd7 => after,
-            _ => match segment(bytes, at) {
-                Some((_, _, after)) => after,
-                None => return false,
-            },
+            _ => segment(bytes, at)?.2,
         };
     }
-    false
 }
 
 /// The next marker from a place on, and the place behind it.
@@ -120,6 +125,9 @@ fn next_marker(bytes: &[u8], from: usize) -> Option<(u8, usize)> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::*;
 
     /// A JPEG with a thumbnail in a segment, one scan with an escaped 0xff and a restart marker, and fill bytes.
@@ -130,23 +138,46 @@ mod tests {
 
     #[test]
     fn a_jpeg_ends_with_its_own_marker_and_not_with_that_of_a_thumbnail() {
-        assert!(has_end(&WHOLE));
-        assert!(has_end(&WHOLE[..31]));
-        for length in 0..31 {
-            assert!(!has_end(&WHOLE[..length]), "{length}");
+        assert_eq!(length(&WHOLE), Some(31));
+        assert_eq!(length(&WHOLE[..31]), Some(31));
+        for cut in 0..31 {
+            assert_eq!(length(&WHOLE[..cut]), None, "{cut}");
         }
     }
 
     #[test]
     fn the_end_of_another_picture_behind_it_is_not_its_own() {
         let second = [&WHOLE[..27], &WHOLE[..]].concat();
-        assert!(!has_end(&second));
+        assert!(length(&second).is_none());
     }
 
     #[test]
     fn a_length_that_leads_beyond_the_file_is_no_end() {
-        assert!(!has_end(&[0xff, 0xd8, 0xff, 0xe1, 0xff, 0xff, 0xff, 0xd9]));
-        assert!(!has_end(&[0xff; 9]));
-        assert!(!has_end(&[]));
+        assert!(length(&[0xff, 0xd8, 0xff, 0xe1, 0xff, 0xff, 0xff, 0xd9]).is_none());
+        assert!(length(&[0xff; 9]).is_none());
+        assert!(length(&[]).is_none());
+    }
+
+    #[test]
+    fn what_stands_behind_a_jpeg_is_not_part_of_it() {
+        // Start, a table, a scan with stuffed bytes and a restart marker, end.
+        let jpeg = [
+            0xff, 0xd8, 0xff, 0xdb, 0, 3, 9, 0xff, 0xff, 0xda, 0, 2, 7, 0xff, 0, 9, 0xff, 0xd3, 8,
+            0xff, 0xd9,
+        ];
+        for behind in [&[][..], &[0; 40], &jpeg, &[0xff, 0xd9]] {
+            let data = [&jpeg[..], behind].concat();
+            assert_eq!(length(&data), Some(jpeg.len()), "{behind:?}");
+        }
+        for cut in 0..jpeg.len() {
+            assert_eq!(length(&jpeg[..cut]), None, "cut to {cut}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_have_a_jpeg_longer_than_they_are(data in vec(any::<u8>(), 0..80)) {
+            prop_assert!(length(&data).is_none_or(|found| found <= data.len()));
+        }
     }
 }

@@ -14,7 +14,7 @@ mod decode;
 mod error;
 mod exr;
 mod format;
-mod jpeg;
+pub mod jpeg;
 mod orientation;
 mod png_exif;
 mod radiance;

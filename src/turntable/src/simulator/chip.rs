@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 use rig_firmware::board::{Board, Events, Inputs, Outputs, ResetCause};
 use rig_firmware::controller::Controller;
-use rig_firmware::realtime::{Realtime, Received, classify};
+use rig_firmware::realtime::{Received, classify};
 use rig_firmware::stepper::Stepper;
 
 use super::ground_truth::STEPS_PER_TURN;
@@ -241,7 +241,7 @@ impl Bench {
             Received::Realtime(realtime) => {
                 self.stepper.obey(realtime);
                 self.stop_idle_timer();
-                self.events.insert(event_of(realtime));
+                self.events.insert(Events::from(realtime));
             }
         }
     }
@@ -251,17 +251,6 @@ impl Bench {
         if self.stepper.is_halted() {
             self.next_step = None;
         }
-    }
-}
-
-fn event_of(realtime: Realtime) -> Events {
-    match realtime {
-        Realtime::Status => Events::STATUS,
-        Realtime::Hold => Events::HOLD,
-        Realtime::Resume => Events::RESUME,
-        Realtime::Reset => Events::RESET,
-        Realtime::JogCancel => Events::JOG_CANCEL,
-        Realtime::Ignored => Events::NONE,
     }
 }
 

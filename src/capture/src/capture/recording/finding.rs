@@ -1,5 +1,7 @@
 //! What can be wrong with a take, frame by frame and as a whole.
 
+use relit_data::counts::count_of;
+
 use super::timing::{MissingFrames, TimingAnomaly};
 use relit_camera::FrameFault;
 
@@ -57,7 +59,10 @@ impl Finding {
     pub(super) fn text(&self, n: usize) -> String {
         match self {
             Self::Missing(missing) => {
-                format!("{} missing before frame {n}", frames(missing.count))
+                format!(
+                    "{} missing before frame {n}",
+                    count_of(missing.count, "frame")
+                )
             }
             Self::QueueFull(_) => {
                 format!("the disk was too slow: a frame was dropped before frame {n}")
@@ -67,19 +72,11 @@ impl Finding {
             ),
             Self::Unwritten { count, .. } => format!(
                 "the disk accepted no more data: {} from frame {n} on are missing",
-                frames(*count)
+                count_of(*count, "frame")
             ),
             Self::Damaged(_, fault) => format!("frame {n} is damaged: {fault}"),
             Self::Anomaly(anomaly) => anomaly.to_string(),
             Self::Settings(what) => what.clone(),
         }
-    }
-}
-
-/// A number of frames, in words.
-pub(super) fn frames(count: u64) -> String {
-    match count {
-        1 => "1 frame".to_owned(),
-        _ => format!("{count} frames"),
     }
 }

@@ -9,9 +9,7 @@ use std::{fmt, fs};
 
 use super::error::RecordingError;
 use relit_data::causes::with_causes;
-use relit_data::session::{
-    InterruptedSession, MANIFEST_FILE, Manifest, Recording, SessionError, Status,
-};
+use relit_data::session::{InterruptedSession, Manifest, Recording, SessionError, Status};
 use relit_video::Video;
 
 use relit_turntable::AngleFit;
@@ -159,7 +157,5 @@ fn verify(folder: &Path, wanted: usize) -> Result<(), RecordingError> {
 
 /// Whether the manifest says so now; it is read again once the session is locked.
 fn says_recording(folder: &Path) -> bool {
-    let manifest = fs::read(folder.join(MANIFEST_FILE)).ok();
-    let manifest = manifest.and_then(|bytes| Manifest::from_json(&bytes).ok());
-    manifest.is_some_and(|manifest| manifest.status == Status::Recording)
+    Manifest::read(folder).is_ok_and(|manifest| manifest.status == Status::Recording)
 }

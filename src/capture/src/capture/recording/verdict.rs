@@ -3,18 +3,17 @@
 use std::error::Error;
 
 use super::error::RecordingError;
-use super::finding::{Finding, frames};
+use super::finding::Finding;
 use super::outcome::{CameraOutcome, EndReason, WriterOutcome};
 use super::recovery::whole_frames;
 use super::timing::{MissingFrames, TimingAnomaly};
 use super::trimmer::TurnCount;
 use crate::state::{TakeSummary, Verdict};
 use relit_data::causes::with_causes;
+use relit_data::counts::count_of;
 use relit_data::disk::DISK_FULL;
-use relit_data::session::{Fault, FrameEntry, TurnJournal};
+use relit_data::session::{Fault, FrameEntry, TurnJournal, is_possible_angle};
 
-/// Largest angle that can be right, degrees.
-const MAX_DEGREES: f64 = 1e6;
 /// Most faults of one kind that the manifest lists.
 const MAX_LISTED: usize = 40;
 
@@ -201,17 +200,20 @@ impl FinishedRecording {
         let slow = count(|finding| matches!(finding, Finding::QueueFull(_)));
         let mut found = String::new();
         if lost > 0 {
-            found = format!("{} lost", frames(lost));
+            found = format!("{} lost", count_of(lost, "frame"));
         }
         if let Some(first) = self.camera.count.missing.first() {
             found += &format!(" (the camera dropped exposure {} first)", first.exposure);
         }
         if slow > 0 {
-            found += &format!(", {} of them because the disk was too slow", frames(slow));
+            found += &format!(
+                ", {} of them because the disk was too slow",
+                count_of(slow, "frame")
+            );
         }
         if damaged > 0 {
             let and = if lost > 0 { " and " } else { "" };
-            found += &format!("{and}{} damaged", frames(damaged));
+            found += &format!("{and}{} damaged", count_of(damaged, "frame"));
         }
         let most = self.max_dropped;
         (lost + damaged > most).then(|| format!("{found}, but only {most} are allowed"))
@@ -232,7 +234,7 @@ impl FinishedRecording {
         format!(
             "{DISK_FULL}: in {} about {missing} bytes are missing for the rest of the turn ({}): {}",
             self.writer.session.folder().display(),
-            frames(left),
+            count_of(left, "frame"),
             first_cause(failure)
         )
     }
@@ -241,7 +243,7 @@ impl FinishedRecording {
     fn lead_note(&self) -> Option<Fault> {
         let first = self.writer.session.index().entries().first()?;
         let lead = lead_of(&self.writer.delivered);
-        let frames = frames(lead);
+        let frames = count_of(lead, "frame");
         (lead > 0).then(|| Fault {
             t_us: first.t_us,
             what: format!(
@@ -307,10 +309,9 @@ fn amended(
         Some(exposure) => lead_of(delivered) + exposure,
         None => entry.n,
     };
-    let possible = |angle: &f64| (-MAX_DEGREES..=MAX_DEGREES).contains(angle);
     FrameEntry {
         sequence,
-        angle_deg: angle(entry.t_us).filter(possible),
+        angle_deg: angle(entry.t_us).filter(is_possible_angle),
         ..*entry
     }
 }

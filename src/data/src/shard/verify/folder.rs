@@ -1,7 +1,6 @@
 //! Checks the layout `paper`: a folder of images with the session's samples.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 use image::RgbImage;
@@ -13,7 +12,7 @@ use crate::causes::with_causes;
 use crate::image_stats::MaskSpans;
 use crate::shard::codec::decode_rgb;
 use crate::shard::digest::{Digest, FolderHasher};
-use crate::shard::file::{FileEntry, compare};
+use crate::shard::file::{FileEntry, compare, read_limited};
 use crate::shard::folder::MeanImage;
 use crate::shard::{ShardError, names, output};
 
@@ -212,18 +211,6 @@ fn check_mean(check: &mut SessionCheck<'_>, mean: Option<&MeanImage>) {
     check.note_in(&file, None, what);
 }
 
-/// The bytes of a file of limited size.
 fn read(path: &Path) -> Result<Vec<u8>, ShardError> {
-    let read_limited = |file: File| {
-        let mut bytes = Vec::new();
-        file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > MAX_BYTES {
-            let what = format!("it has more than {MAX_BYTES} bytes");
-            return Err(io::Error::other(what));
-        }
-        Ok(bytes)
-    };
-    File::open(path)
-        .and_then(read_limited)
-        .map_err(ShardError::io("read", path))
+    read_limited(path, MAX_BYTES).map_err(ShardError::io("read", path))
 }
