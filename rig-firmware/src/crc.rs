@@ -32,12 +32,6 @@ impl Crc {
     }
 }
 
-impl Default for Crc {
-    fn default() -> Self {
-        Crc::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

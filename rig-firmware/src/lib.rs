@@ -23,6 +23,10 @@
 //!
 //! What interrupts do is in `stepper` and `realtime` alone; all else runs in the main loop.
 #![no_std]
+#![allow(
+    clippy::new_without_default,
+    reason = "boards build statics, which need constant functions"
+)]
 
 pub mod board;
 mod checked;

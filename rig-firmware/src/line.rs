@@ -180,12 +180,6 @@ impl LineReader {
     }
 }
 
-impl Default for LineReader {
-    fn default() -> Self {
-        LineReader::new()
-    }
-}
-
 fn sum_digit(digits: u8, value: u16, byte: u8) -> Part {
     let digit = match byte {
         b'0'..=b'9' => byte - b'0',

@@ -364,9 +364,3 @@ impl Stepper {
         }
     }
 }
-
-impl Default for Stepper {
-    fn default() -> Self {
-        Stepper::new()
-    }
-}

@@ -31,12 +31,6 @@ impl Modal {
     }
 }
 
-impl Default for Modal {
-    fn default() -> Self {
-        Modal::new()
-    }
-}
-
 /// A place to go to, thousandths of a degree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Target {

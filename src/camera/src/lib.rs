@@ -14,16 +14,17 @@
 //! ```
 //! use std::time::Duration;
 //!
-//! use relit_camera as camera;
+//! use relit_camera::{self as camera, CameraMode, Fourcc, Rate};
 //! use relit_data::clock::Clock;
 //!
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap();
 //! let address = "replay:fixtures/20261120T101500Z-cow-short".parse()?;
 //! let mut camera = camera::open(&address, Clock::virtual_time())?;
-//! camera.start(&"MJPG:480x360@30".parse()?)?;
+//! let rate = Rate::from_per_second(30.0).ok_or("no rate")?;
+//! camera.start(&CameraMode { fourcc: Fourcc::MJPG, width: 480, height: 360, rate })?;
 //! let frame = camera.next_frame(Duration::from_secs(5))?;
 //! assert_eq!((frame.width, frame.height, frame.fault()), (480, 360, None));
-//! # Ok::<(), camera::CameraError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod address;

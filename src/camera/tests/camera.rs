@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use relit_camera::{self as camera, Camera, CameraError, Frame};
+use relit_camera::{self as camera, Camera, CameraError, CameraMode, Fourcc, Frame, Rate};
 use relit_data::clock::Clock;
 use relit_test_support::ffmpeg;
 use tempfile::TempDir;
@@ -28,7 +28,13 @@ fn replay(
 }
 
 fn play(camera: &mut dyn Camera) -> Vec<Frame> {
-    camera.start(&"MJPG:640x480@30".parse().unwrap()).unwrap();
+    let mode = CameraMode {
+        fourcc: Fourcc::MJPG,
+        width: 640,
+        height: 480,
+        rate: Rate::new(30, 1).unwrap(),
+    };
+    camera.start(&mode).unwrap();
     let next = || camera.next_frame(Duration::from_secs(20)).ok();
     std::iter::from_fn(next).collect()
 }

@@ -15,21 +15,20 @@ use serde_json::Value;
 pub enum Event {
     // Every program. `session` is missing where an event concerns none.
     Warning {
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         session: Option<String>,
         message: String,
     },
     Error {
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         session: Option<String>,
         message: String,
         /// The input that it concerns, of several.
         input: Option<String>,
     },
     Progress {
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         session: Option<String>,
-        #[serde(default)]
         what: String,
         done: u64,
         /// 0: not counted yet.
@@ -73,21 +72,13 @@ pub enum Event {
     Unlocked(Value),
     // relit-mask
     Mask {
-        #[serde(default)]
         session: String,
-        #[serde(default)]
         input: String,
-        #[serde(default)]
         mask: String,
-        #[serde(default)]
         record: String,
-        #[serde(default)]
         preview: String,
-        #[serde(default)]
         source: Value,
-        #[serde(default)]
         result: Value,
-        #[serde(default)]
         warnings: Vec<String>,
     },
     /// A mask that was made by hand, and that nobody asked to replace.
@@ -106,25 +97,20 @@ pub enum Event {
     },
     Extracted {
         session: String,
-        #[serde(default)]
         input: String,
         /// That of `dataset.json`.
         entry: Value,
     },
     Skipped {
         session: String,
-        #[serde(default)]
         input: String,
         lossy: bool,
-        #[serde(default)]
         misfit: bool,
-        #[serde(default)]
         broken: bool,
     },
     LeftOut {
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         session: Option<String>,
-        #[serde(default)]
         input: String,
         message: String,
     },
@@ -136,23 +122,17 @@ pub enum Event {
         seconds_left: Option<u64>,
     },
     Problem {
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         session: Option<String>,
-        #[serde(default)]
         file: String,
         sample: Option<String>,
         message: String,
     },
     Verified {
-        #[serde(default)]
         out: String,
-        #[serde(default)]
         sessions: u64,
-        #[serde(default)]
         shards: u64,
-        #[serde(default)]
         samples: u64,
-        #[serde(default)]
         problems: u64,
     },
     Merged {
@@ -191,11 +171,8 @@ pub enum Event {
 pub enum Check {
     /// A mask, by `relit-mask check`.
     Mask {
-        #[serde(default)]
         session: String,
-        #[serde(default)]
         input: String,
-        #[serde(default)]
         page: String,
         report: Value,
     },

@@ -13,7 +13,7 @@ use ::nokhwa::utils::{
 };
 
 use super::*;
-use crate::Mode;
+use crate::{Mode, Rate};
 use relit_data::causes::with_causes;
 use relit_data::clock::Clock;
 use relit_data::session::FrameClock;
@@ -32,6 +32,15 @@ struct Scripted {
     info: CameraInfo,
     format: CameraFormat,
     steps: Receiver<Step>,
+}
+
+fn mode(fourcc: &[u8; 4], width: u32, height: u32, fps: u32) -> CameraMode {
+    CameraMode {
+        fourcc: Fourcc(*fourcc),
+        width,
+        height,
+        rate: Rate::new(fps, 1).unwrap(),
+    }
 }
 
 fn refused(what: &str) -> NokhwaError {
@@ -141,7 +150,7 @@ fn camera() -> (NokhwaCamera, SyncSender<Step>) {
 
 fn started() -> (NokhwaCamera, SyncSender<Step>) {
     let (mut camera, script) = camera();
-    let request = "GREY:2x1@25".parse().unwrap();
+    let request = mode(b"GREY", 2, 1, 25);
     let granted = camera.start(&request).unwrap();
     assert_eq!(granted.differences(&request), [] as [&str; 0]);
     (camera, script)
@@ -164,7 +173,7 @@ fn frames_come_without_a_counter_and_with_the_time_of_their_arrival() {
 #[test]
 fn of_a_whole_buffer_only_the_jpeg_is_taken() {
     let (mut camera, script) = camera();
-    camera.start(&"MJPG:640x480@30".parse().unwrap()).unwrap();
+    camera.start(&mode(b"MJPG", 640, 480, 30)).unwrap();
     let jpeg = [0xff, 0xd8, 0xff, 0xda, 0, 2, 5, 0xff, 0xd9];
     let before = [4, 0xff, 0xd9, 0, 0];
     let buffer = [&jpeg[..], &before].concat();
@@ -212,7 +221,7 @@ fn a_stream_is_stopped_and_started_again() {
     let error = camera.next_frame(MAX_DELAY).unwrap_err();
     assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
     let script = last.join().unwrap();
-    camera.start(&"GREY:2x1@30".parse().unwrap()).unwrap();
+    camera.start(&mode(b"GREY", 2, 1, 30)).unwrap();
     script.send(Step::Frame(vec![5, 6])).unwrap();
     assert_eq!(camera.next_frame(TIMEOUT).unwrap().data, [5, 6]);
 }
@@ -227,7 +236,7 @@ fn an_error_of_the_library_keeps_its_words_and_the_camera_starts_again() {
         text.contains("nokhwa:3") && text.contains("the cable is loose"),
         "{text}"
     );
-    camera.start(&"GREY:2x1@30".parse().unwrap()).unwrap();
+    camera.start(&mode(b"GREY", 2, 1, 30)).unwrap();
     script.send(Step::Frame(vec![1, 2])).unwrap();
     assert!(camera.next_frame(TIMEOUT).is_ok());
 }
@@ -240,7 +249,7 @@ fn a_library_that_panics_is_an_unplugged_camera() {
         let error = camera.next_frame(TIMEOUT).unwrap_err();
         assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
     }
-    let error = camera.start(&"GREY:2x1@25".parse().unwrap()).unwrap_err();
+    let error = camera.start(&mode(b"GREY", 2, 1, 25)).unwrap_err();
     assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::{Fourcc, FrameFault, open};
+use crate::{Fourcc, FrameFault, Rate, open};
 use relit_data::session::FrameIndex;
 
 const SHORT: &str = "20261120T101500Z-cow-short";
@@ -18,7 +18,12 @@ fn fixture(name: &str) -> PathBuf {
 }
 
 fn request() -> CameraMode {
-    "MJPG:480x360@30".parse().unwrap()
+    CameraMode {
+        fourcc: Fourcc::MJPG,
+        width: 480,
+        height: 360,
+        rate: Rate::new(30, 1).unwrap(),
+    }
 }
 
 fn started(name: &str, options: &str) -> Box<dyn Camera> {
