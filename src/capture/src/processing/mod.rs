@@ -1,7 +1,7 @@
 //! What is made of recorded sessions: masks, their check, the extraction, by the programs relit-mask and
 //! relit-extract where they are installed.
 //!
-//! The `queue` decides what is done when, `events` what a program's words mean; both are without I/O. One thread
+//! The `queue` decides what is done when, `events` what a program's words mean, `results` what it made. One thread
 //! starts the programs as `child` processes. While the rig captures or moves nothing begins,
 //! and what runs is stopped (`SIGSTOP`) until the rig rests. Results lie where the programs leave them, in the session
 //! and the data set; only the settings are kept (`store`) here.
@@ -11,6 +11,7 @@ mod commands;
 mod editor;
 mod events;
 mod queue;
+pub(crate) mod results;
 mod runner;
 mod shared;
 mod store;

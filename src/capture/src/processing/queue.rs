@@ -32,6 +32,16 @@ pub(super) struct StepOutcome {
     pub(super) goes_on: bool,
 }
 
+impl StepOutcome {
+    pub(super) fn failed(what: String) -> Self {
+        Self {
+            outcome: ProcessingOutcome::Failed,
+            what,
+            goes_on: false,
+        }
+    }
+}
+
 /// Queue and job under way.
 #[derive(Debug, Default)]
 pub(super) struct ProcessingQueue {

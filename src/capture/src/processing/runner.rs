@@ -12,8 +12,9 @@ use super::commands::StepPlaces;
 use super::editor::OpenEditor;
 use super::events::ProgramEvent;
 use super::queue::StepOutcome;
+use super::results::{entries_in, results_of};
 use super::shared::{Shared, ToStart, is_busy};
-use crate::state::{Monitor, ProcessingJob, ProcessingOutcome, ProcessingStep, Verdict};
+use crate::state::{Monitor, ProcessingJob, ProcessingStep, Verdict};
 
 /// Longest time between two looks at the program and the rig.
 const LOOK: Duration = Duration::from_millis(50);
@@ -114,15 +115,7 @@ fn begin(shared: &Shared) -> Option<Running> {
             heard: ProgramEvent::default(),
         }),
         Err(why) => {
-            finish(
-                shared,
-                &begun,
-                StepOutcome {
-                    outcome: ProcessingOutcome::Failed,
-                    what: why,
-                    goes_on: false,
-                },
-            );
+            finish(shared, &begun, StepOutcome::failed(why));
             None
         }
     }
@@ -166,10 +159,22 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
         Ok(Some(status)) => status.code(),
         Err(_) => None,
     };
-    let error_output = running.worker.error_output();
-    let end = running.heard.end(running.begun.step, status, &error_output);
+    let end = outcome(shared, &running, status);
     finish(shared, &running.begun, end);
     None
+}
+
+/// How the program under way ended, by its exit code and its files.
+fn outcome(shared: &Shared, running: &Running, exit_code: Option<i32>) -> StepOutcome {
+    let ProcessingJob { session, step, .. } = &running.begun;
+    let made = running.heard.is_success(exit_code).then(|| {
+        let entry = entries_in(&shared.dataset).remove(session);
+        results_of(&shared.root.join(session), entry).outcome(*step)
+    });
+    made.flatten().unwrap_or_else(|| {
+        let error_output = running.worker.error_output();
+        StepOutcome::failed(running.heard.failure(exit_code, &error_output))
+    })
 }
 
 fn finish(shared: &Shared, begun: &ProcessingJob, end: StepOutcome) {

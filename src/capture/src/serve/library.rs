@@ -8,7 +8,9 @@ use axum::http::StatusCode;
 use serde::Serialize;
 
 use super::cache::{Cache, FileVersion};
-use super::results::{CHECK_PAGE, DatasetEntries, SessionResults, entries_in, results_of};
+use crate::processing::results::{
+    CHECK_PAGE, DatasetEntries, SessionResults, entries_in, results_of,
+};
 use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
 use relit_data::session::{

@@ -8,8 +8,10 @@ use std::process::Command;
 use std::sync::{Arc, mpsc};
 use std::thread;
 
+use relit_data::geometry::Rect;
 use relit_data::shard::{
-    Align, Dataset, Digest, ExtractionSettings, ImageSize, Layout, ShardEntry,
+    Align, Dataset, Digest, ExtractionSettings, FileEntry, ImageSize, Layout, MaskInfo,
+    QualityVerdict, SamplingBasis, SessionEntry, SessionQuality, ShardEntry, SourceVideo,
 };
 use serde_json::{Value, json};
 
@@ -19,10 +21,10 @@ use crate::state::{Phase, TakeSummary, Verdict};
 
 const COW: &str = "20261120T101500Z-cow-short";
 const BUST: &str = "20261120T102000Z-bust-short";
-/// A mask that fits, and an extraction: what the programs leave and say.
-const MASK: &str = r#"printf png > "$1/mask.png"; echo '{"event":"mask"}'"#;
-const FITS: &str = r#"echo '{"event":"check","report":{"verdict":"fits","reasons":[]}}'"#;
-const GOOD: &str = r#"echo '{"event":"extracted","session":"x","entry":{"samples":1500,"quality":{"verdict":"good","reasons":[]}}}'"#;
+/// A mask that fits, and an extraction: what the programs leave.
+const MASK: &str = r#"printf png > "$1/mask.png""#;
+const FITS: &str = r#"echo '{"verdict":"fits","reasons":[]}' > "$1/mask-check.json""#;
+const GOOD: &str = r#"mkdir -p "$3"; cp "$here/dataset.json" "$3""#;
 /// Waits until the file `go` appears beside the script. It starts no other program meanwhile: a shell that is held
 /// while it does so waits for that program, and does not count as stopped.
 const WAIT: &str = r#"echo $$ > "$here/pid"; while [ ! -e "$here/go" ]; do :; done"#;
@@ -42,6 +44,9 @@ const ALL_WELL: Scripts<'_> = Scripts {
 };
 
 fn written(folder: &Path, scripts: Scripts<'_>) -> ProcessingPrograms {
+    let mut dataset = describe(COW, b"");
+    dataset.sessions.push(entry(BUST));
+    dataset.write(folder).unwrap();
     let script = |name: &str, body: &str| {
         let path = folder.join(name);
         let here = folder.display();
@@ -161,7 +166,7 @@ fn a_session_goes_through_mask_check_and_extraction_by_the_programs() {
 #[test]
 fn what_a_program_says_of_its_progress_is_shown_and_a_cancel_ends_it() {
     let folder = tempfile::tempdir().unwrap();
-    let progress = r#"echo '{"event":"progress","done":30,"of":120}'"#;
+    let progress = r#"echo '{"event":"progress","what":"","done":30,"of":120}'"#;
     let extract = format!("{progress}; {WAIT}");
     let scripts = Scripts {
         extract: Some(&extract),
@@ -290,7 +295,7 @@ fn what_goes_wrong_is_told_in_the_programs_own_words() {
 fn a_mask_that_is_wrong_is_not_extracted_before_a_person_has_looked() {
     let folder = tempfile::tempdir().unwrap();
     let scripts = Scripts {
-        check: r#"echo '{"event":"check","report":{"verdict":"wrong","reasons":["a hole"]}}'; exit 3"#,
+        check: r#"echo '{"verdict":"wrong","reasons":["a hole"]}' > "$1/mask-check.json"; exit 3"#,
         ..ALL_WELL
     };
     let serving = serving(folder.path(), scripts);
@@ -328,7 +333,7 @@ fn what_became_of_an_automatic_mask_is_forgotten_once_a_person_has_made_one() {
     let folder = tempfile::tempdir().unwrap();
     let editor = r#"case "$*" in
         *--edit*) echo '{"event":"editor","address":"127.0.0.1:9","url":"http://127.0.0.1:9/?token=secret"}'
-            echo '{"event":"mask"}';;
+            echo '{"event":"mask","input":"","mask":"","preview":"","record":"","result":{},"session":"","source":{},"warnings":[]}';;
         *) exit 1;;
     esac"#;
     let scripts = Scripts {
@@ -423,6 +428,49 @@ fn the_page_about_a_session_in_the_data_set_runs_no_scripts() {
     assert!(policy.contains("sandbox") && policy.contains("default-src 'none'"));
 }
 
+/// The entry of a session that was extracted, and is good.
+fn entry(session: &str) -> SessionEntry {
+    let hash = Digest::hash(b"");
+    let quality = SessionQuality::from_records(&[], false, None);
+    SessionEntry {
+        id: session.to_owned(),
+        object: "cow".to_owned(),
+        input: SourceVideo {
+            video: "video.mkv".to_owned(),
+            codec: "mjpeg".to_owned(),
+            frames: 1500,
+            bytes: 0,
+            blake3: hash,
+            colour_conversion: None,
+            index_blake3: None,
+        },
+        mask: MaskInfo {
+            blake3: hash,
+            px: 1,
+            bounding_box: Rect::new(0, 0, 1, 1),
+        },
+        selection: SamplingBasis::Angle,
+        samples: 1500,
+        covered_deg: None,
+        rig: None,
+        duplicates: 0,
+        spec_net: 0,
+        lossy: false,
+        quality: SessionQuality {
+            verdict: QualityVerdict::Good,
+            reasons: Vec::new(),
+            ..quality
+        },
+        warnings: Vec::new(),
+        table: FileEntry {
+            file: format!("{session}.parquet"),
+            bytes: 0,
+            blake3: hash,
+        },
+        report: None,
+    }
+}
+
 /// The description of a data set that has these samples of a session.
 fn describe(session: &str, samples: &[u8]) -> Dataset {
     let mut dataset = Dataset::new(ExtractionSettings {
@@ -436,6 +484,7 @@ fn describe(session: &str, samples: &[u8]) -> Dataset {
         layout: Layout::Webdataset,
         scaling: "area".to_owned(),
     });
+    dataset.sessions.push(entry(session));
     dataset.shards.push(ShardEntry {
         file: format!("{session}.tar"),
         session: session.to_owned(),
