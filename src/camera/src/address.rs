@@ -98,9 +98,8 @@ impl FromStr for CameraAddress {
     type Err = CameraError;
 
     fn from_str(text: &str) -> Result<Self, CameraError> {
-        parse(text).map_err(|fault| CameraError::Address {
-            text: text.to_owned(),
-            fault,
+        parse(text).map_err(|fault| {
+            CameraError::Address(format!("{text:?} is not a camera's address: {fault}"))
         })
     }
 }

@@ -19,14 +19,9 @@ const PERMITTING: &str = if cfg!(target_os = "linux") {
 /// [`relit_data::causes::with_causes`] writes both as one sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
-    /// A text that is neither an address nor a mode.
-    #[error("{text:?} is not a camera's address: {fault}")]
-    Address {
-        /// The text.
-        text: String,
-        /// What is wrong in it.
-        fault: String,
-    },
+    /// A text that is not an address, and why not.
+    #[error("{0}")]
+    Address(String),
     /// No such device.
     #[error(
         "no camera at {device}: plug it in, or give another; `relit-capture devices` lists them"

@@ -1,11 +1,11 @@
 //! The errors of a turntable. Each message says what to do.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use super::codes::{Alarm, describe_error};
 use super::protocol::{ControllerState, LineFault, SendError};
 use super::supervisor::MotionFault;
-use crate::lockfile::LockError;
 
 /// An error of a turntable.
 #[derive(Debug, thiserror::Error)]
@@ -34,13 +34,14 @@ pub enum TurntableError {
     ),
     /// Another process owns the port.
     #[error(
-        "process {pid} uses {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does)"
+        "{} uses {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does)",
+        process_named(*.pid)
     )]
     Owned {
         /// The port.
         path: PathBuf,
-        /// The owner.
-        pid: u32,
+        /// The owner, where that is known.
+        pid: Option<u32>,
     },
     /// The port could not be opened.
     #[error(
@@ -52,30 +53,14 @@ pub enum TurntableError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The lock of the port could not be used.
-    #[error(transparent)]
-    Lock(#[from] LockError),
-    /// There is no Grbl controller at the port.
-    #[error(
-        "{port} does not answer as a Grbl 1.1 controller ({heard}): check port, cable, power and firmware: the rig's, Grbl 1.1, grblHAL or FluidNC"
-    )]
-    NoController {
-        /// The port.
-        port: String,
-        /// What was received instead.
-        heard: String,
-    },
+    /// What was asked for cannot be done, or was not: what happened, and what to do.
+    #[error("{0}")]
+    Failed(String),
     /// The controller did not report something that is needed.
     #[error(
         "the controller does not report {0}: send `$$` and `$I` to it by hand and look at the answers"
     )]
     NotReported(String),
-    /// No report or answer came.
-    #[error("the table did not answer `?` within {milliseconds} ms: check cable and power")]
-    Silent {
-        /// The time limit.
-        milliseconds: u64,
-    },
     /// The controller refused a line.
     #[error("the controller refused {block:?} with error:{code}, {}", describe_error(*.code))]
     Refused {
@@ -129,18 +114,6 @@ pub enum TurntableError {
         /// The valid range.
         range: String,
     },
-    /// A target is outside the limits.
-    #[error(
-        "{target_deg:.3} degrees is beyond the limits {low_deg:.3} to {high_deg:.3}: go there the other way round, so that the cable unwinds"
-    )]
-    BeyondLimit {
-        /// The target.
-        target_deg: f64,
-        /// Lower limit.
-        low_deg: f64,
-        /// Upper limit.
-        high_deg: f64,
-    },
     /// The turn does not fit between the limits.
     #[error(
         "no room for a turn from {from_deg:.3} degrees: it takes {forward_deg:.3} degrees onwards and {back_deg:.3} back, and the limits are {low_deg:.3} and {high_deg:.3}; {way_out}"
@@ -159,25 +132,27 @@ pub enum TurntableError {
         /// What to do.
         way_out: String,
     },
-    /// The table has moved since the turn was planned.
-    #[error(
-        "the turn was planned from {planned_deg:.3} degrees and the table stands at {at_deg:.3}: plan it again"
-    )]
-    MovedSincePlan {
-        /// Where it was planned from.
-        planned_deg: f64,
-        /// Where the table stands.
-        at_deg: f64,
-    },
     /// A fault ended the motion.
     #[error("the motion failed: {0}")]
     Motion(#[from] MotionFault),
     /// The table was not reported at rest after a stop.
     #[error("the table did not report that it stopped: cut its power, then check the cable")]
     NotStopped,
-    /// The reports of a turn do not determine its angles; why.
-    #[error("the turn's angles cannot be determined: {0}")]
-    AngleFit(String),
+}
+
+impl TurntableError {
+    /// That no report or answer came within a time limit.
+    pub(super) fn silent(limit: Duration) -> Self {
+        let milliseconds = limit.as_millis();
+        Self::Failed(format!(
+            "the table did not answer `?` within {milliseconds} ms: check cable and power"
+        ))
+    }
+}
+
+/// A process in a sentence.
+fn process_named(pid: Option<u32>) -> String {
+    pid.map_or("another process".to_owned(), |pid| format!("process {pid}"))
 }
 
 fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {

@@ -147,10 +147,10 @@ fn no_controller(connection: &Connection) -> TurntableError {
             format!("{lines} lines came that are not Grbl's, or lack the machine position ($10=1)")
         }
     };
-    TurntableError::NoController {
-        port: connection.port_name().to_owned(),
-        heard,
-    }
+    TurntableError::Failed(format!(
+        "{} does not answer as a Grbl 1.1 controller ({heard}): check port, cable, power and firmware: the rig's, Grbl 1.1, grblHAL or FluidNC",
+        connection.port_name()
+    ))
 }
 
 /// The answer to `$I`, complete with version and options.

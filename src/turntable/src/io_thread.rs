@@ -129,9 +129,7 @@ impl Connection {
             Some(error) => Some(Err(error)),
             None => supervisor.take_answer(id).map(Ok),
         });
-        outcome.unwrap_or(Err(TurntableError::Silent {
-            milliseconds: limit.as_millis() as u64,
-        }))
+        outcome.unwrap_or_else(|| Err(TurntableError::silent(limit)))
     }
 
     /// The table's status by a report that is requested now; without checksums, confirmed by a
@@ -148,9 +146,7 @@ impl Connection {
             let fresh = report.asked_us.is_some_and(|us| us >= asked_us);
             (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::new(report, supervisor)))
         });
-        status.unwrap_or(Err(TurntableError::Silent {
-            milliseconds: REPORT_WAIT.as_millis() as u64,
-        }))
+        status.unwrap_or_else(|| Err(TurntableError::silent(REPORT_WAIT)))
     }
 
     /// Brings the table to a standstill and discards its remaining motions.

@@ -28,7 +28,7 @@ impl Table {
     /// table stops when this computer fails. The controller stores the setting.
     ///
     /// # Errors
-    /// [`TurntableError::NotHomed`], [`TurntableError::MovedSincePlan`], or what stops a motion.
+    /// [`TurntableError::NotHomed`], [`TurntableError::Failed`], or what stops a motion.
     pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
         self.ensure_checked_session()?;
         let status = self.ready()?;
@@ -37,10 +37,10 @@ impl Table {
         }
         let planned_deg = plan.start_deg;
         if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity().step_deg() {
-            return Err(TurntableError::MovedSincePlan {
-                planned_deg,
-                at_deg: status.angle_deg,
-            });
+            return Err(TurntableError::Failed(format!(
+                "the turn was planned from {planned_deg:.3} degrees and the table stands at {:.3}: plan it again",
+                status.angle_deg
+            )));
         }
         if self.identity().lease_s == Some(0.0) {
             self.set_lease()?;
@@ -125,7 +125,7 @@ impl<'table> Turn<'table> {
     /// Waits until the table rests at the turn's end, turns it back, and returns its angles over time.
     ///
     /// # Errors
-    /// The fault that has ended the turn; the table has been stopped. [`TurntableError::AngleFit`] if
+    /// The fault that has ended the turn; the table has been stopped. [`TurntableError::Failed`] if
     /// the turn is complete but its angles cannot be determined.
     pub fn wait_end(self) -> Result<AngleFit, TurntableError> {
         let (track, finished) = self.wait_rest();
@@ -138,14 +138,16 @@ impl<'table> Turn<'table> {
     /// its part at constant speed, which [`FinishedTurn::unwind`] reports.
     ///
     /// # Errors
-    /// [`TurntableError::AngleFit`] in the first part of the result, if the angles cannot be determined.
+    /// [`TurntableError::Failed`] in the first part of the result, if the angles cannot be determined.
     pub fn wait_rest(mut self) -> (Result<AngleFit, TurntableError>, FinishedTurn<'table>) {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         let limit = self.table.travel_time(distance, plan.degrees_per_second);
         let arrived = self.table.wait_arrival(limit);
         let reports = self.leave();
-        let track = angle_fit::fit(&reports, &self.expected()).map_err(TurntableError::AngleFit);
+        let track = angle_fit::fit(&reports, &self.expected()).map_err(|why| {
+            TurntableError::Failed(format!("the turn's angles cannot be determined: {why}"))
+        });
         let finished = FinishedTurn {
             table: self.table,
             arrived,

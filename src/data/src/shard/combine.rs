@@ -13,7 +13,7 @@ use crate::file_names::folded;
 /// entry as it is copied. `progress` is called with the samples done and those of all.
 ///
 /// # Errors
-/// [`ShardError::NotJoined`] if their settings differ or two sessions have names that are one on some file system;
+/// [`ShardError::Refused`] if their settings differ or two sessions have names that are one on some file system;
 /// [`ShardError::Changed`] if a file is not as its `dataset.json` says; [`ShardError::Refused`] if `out` holds anything;
 /// [`ShardError::Locked`] while one of them is being written; those of [`Dataset::read`].
 pub fn merge_datasets(
@@ -29,7 +29,10 @@ pub fn merge_datasets(
     }
     let problems = problems(&datasets);
     let Some((_, first)) = datasets.first().filter(|_| problems.is_empty()) else {
-        return Err(ShardError::NotJoined { problems });
+        let why = problems.join("; ");
+        return Err(ShardError::Refused(format!(
+            "the data sets cannot be merged: {why}"
+        )));
     };
     let new = NewDataset::create(out)?;
     let needs = Needs::of(&datasets);

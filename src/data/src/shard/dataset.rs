@@ -202,7 +202,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`ShardError::NoDataset`] if there is none, [`ShardError::Description`] if it is damaged or of another version,
-    /// [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if it names a file outside the folder,
+    /// [`ShardError::Refused`] if it names a file outside the folder,
     /// [`ShardError::Io`].
     pub fn read(out: &Path) -> Result<Self, ShardError> {
         let path = out.join(Self::FILE);
@@ -218,7 +218,7 @@ impl Dataset {
     /// Writes the description into the folder `out`, whole or not at all.
     ///
     /// # Errors
-    /// [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if an entry could not be read back,
+    /// [`ShardError::Refused`] if an entry could not be read back,
     /// [`ShardError::Refused`] if a number is not finite, [`ShardError::Io`].
     pub fn write(&self, out: &Path) -> Result<(), ShardError> {
         self.check_names()?;

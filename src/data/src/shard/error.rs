@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use parquet::errors::ParquetError;
 
 use crate::disk::{DISK_FULL, is_full};
-use crate::naming::not_a_name;
 
 /// Why a data set could not be written, read or checked.
 #[derive(Debug, thiserror::Error)]
@@ -51,12 +50,6 @@ pub enum ShardError {
         /// What is wrong, one sentence each.
         problems: Vec<String>,
     },
-    /// Data sets that cannot be joined.
-    #[error("the data sets cannot be merged: {}", .problems.join("; "))]
-    NotJoined {
-        /// Why not, one sentence each.
-        problems: Vec<String>,
-    },
     /// Another process is writing into the folder.
     #[error(
         "{} is being written by another process: wait for it to end, or give another folder", .0.display()
@@ -68,16 +61,7 @@ pub enum ShardError {
         .0.display()
     )]
     Busy(PathBuf),
-    /// The id is not a valid session name.
-    #[error("{}", not_a_name(.0))]
-    SessionName(String),
-    /// A path in `dataset.json`, or one given by the caller, that is not a plain path inside the data
-    /// set.
-    #[error(
-        "{0:?} cannot be a file of a data set: it must be relative, without `..`, `\\` and `:`; do not trust its dataset.json"
-    )]
-    UnsafePath(String),
-    /// A session, sample or description that its writer does not take.
+    /// A session, sample, name or description that is not taken.
     #[error("{0}")]
     Refused(String),
     /// An image or mask that cannot be encoded, or a PNG that is not what is expected.

@@ -2,17 +2,17 @@
 
 use super::ShardError;
 use crate::durable;
-use crate::naming::is_session_name;
+use crate::naming::{is_session_name, not_a_name};
 
 /// Checks that `name` can be a session's name, by the rule of [`is_session_name`].
 ///
 /// # Errors
-/// [`ShardError::SessionName`] if it cannot.
+/// [`ShardError::Refused`] if it cannot.
 pub fn check_session(name: &str) -> Result<(), ShardError> {
     if is_session_name(name) {
         Ok(())
     } else {
-        Err(ShardError::SessionName(name.to_owned()))
+        Err(ShardError::Refused(not_a_name(name)))
     }
 }
 
@@ -24,7 +24,9 @@ pub(super) fn check_path(path: &str) -> Result<(), ShardError> {
     if path.split('/').all(plain) && !path.contains(forbidden) {
         Ok(())
     } else {
-        Err(ShardError::UnsafePath(path.to_owned()))
+        Err(ShardError::Refused(format!(
+            "{path:?} cannot be a file of a data set: it must be relative, without `..`, `\\` and `:`; do not trust its dataset.json"
+        )))
     }
 }
 
@@ -184,7 +186,7 @@ mod tests {
         for name in ["a:b", "../a", ""] {
             assert!(matches!(
                 check_session(name),
-                Err(ShardError::SessionName { .. })
+                Err(ShardError::Refused { .. })
             ));
         }
     }

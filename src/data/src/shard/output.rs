@@ -99,7 +99,7 @@ impl OutputFolder {
     /// the page of a session, for example.
     ///
     /// # Errors
-    /// [`ShardError::UnsafePath`] if `name` is not a relative path inside the folder; [`ShardError::Io`].
+    /// [`ShardError::Refused`] if `name` is not a relative path inside the folder; [`ShardError::Io`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<FileEntry, ShardError> {
         write_whole(&self.path, name, bytes)
     }
@@ -397,7 +397,7 @@ mod tests {
         assert_eq!((entry.file.as_str(), entry.bytes), ("a.html", 4));
         assert!(matches!(
             folder.write("../a.html", b""),
-            Err(ShardError::UnsafePath { .. })
+            Err(ShardError::Refused(_))
         ));
     }
 }

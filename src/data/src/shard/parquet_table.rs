@@ -225,7 +225,7 @@ fn write_column(writer: &mut ColumnWriter<'_>, kind: Kind, values: &[&Value]) ->
 ///
 /// # Errors
 /// [`ShardError::Changed`] if the file differs from its entry, [`ShardError::Table`] if it is not Parquet, a column
-/// is missing or a value is out of range, [`ShardError::Io`], [`ShardError::UnsafePath`].
+/// is missing or a value is out of range, [`ShardError::Io`], [`ShardError::Refused`].
 pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, ShardError> {
     names::check_path(&entry.file)?;
     let path = out.join(&entry.file);

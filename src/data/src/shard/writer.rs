@@ -85,7 +85,7 @@ impl ShardWriter {
     /// `out`, which must exist. `mask` holds 0 and 255 only and has the size of the images.
     ///
     /// # Errors
-    /// [`ShardError::SessionName`], [`ShardError::Refused`] for another number of samples, [`ShardError::Image`] if the
+    /// [`ShardError::Refused`] for another name or number of samples, [`ShardError::Image`] if the
     /// mask has other values or no pixels, [`ShardError::Busy`] if the session is being written already,
     /// [`ShardError::Io`].
     pub fn create(

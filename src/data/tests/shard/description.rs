@@ -77,12 +77,12 @@ fn a_description_that_points_out_of_its_folder_is_refused() {
     dataset.replace(bad, Vec::new());
     assert!(matches!(
         dataset.write(dir.path()),
-        Err(ShardError::UnsafePath { .. })
+        Err(ShardError::Refused(_))
     ));
     let json = serde_json::to_vec(&dataset).unwrap();
     fs::write(dir.path().join(Dataset::FILE), json).unwrap();
     assert!(matches!(
         Dataset::read(dir.path()),
-        Err(ShardError::UnsafePath { .. })
+        Err(ShardError::Refused(_))
     ));
 }

@@ -63,7 +63,7 @@ impl fmt::Display for VerifyProblem {
 ///
 /// # Errors
 /// Only without a data set to check: [`ShardError::NoDataset`], [`ShardError::Description`],
-/// [`ShardError::UnsafePath`], [`ShardError::SessionName`], or [`ShardError::Io`] on the folder. Everything else is a
+/// [`ShardError::Refused`], or [`ShardError::Io`] on the folder. Everything else is a
 /// [`VerifyProblem`].
 pub fn verify(
     out: &Path,
