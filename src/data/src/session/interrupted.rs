@@ -98,6 +98,7 @@ impl InterruptedSession {
 mod tests {
     use std::io::Write;
 
+    use super::super::MANIFEST_FILE;
     use super::super::writer::INDEX_AS_FOUND;
     use super::super::writer::{entry, writer};
     use super::*;

@@ -196,7 +196,7 @@ impl FolderImages {
     }
 }
 
-fn image_name(index: u32) -> String {
+pub(super) fn image_name(index: u32) -> String {
     format!("{index}.png")
 }
 
