@@ -1,4 +1,4 @@
-//! Where a turntable is: `serial:/dev/ttyUSB0`, `serial:`, `sim:?speed=10&fault=drop=0.01`, `none`.
+//! Where a turntable is: `serial:/dev/ttyUSB0`, `serial:`, `sim:?speed=10&fault=reset@5s`, `none`.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -7,6 +7,7 @@ use std::str::FromStr;
 use serialport::{SerialPortType, UsbPortInfo};
 
 use super::error::TurntableError;
+use crate::simulator::{SimulatorError, TableFaults};
 
 /// USB ids of the serial adapters that Grbl controllers use: vendor, product (`None`: all products
 /// of that vendor). From usb.ids and the vendors' drivers.
@@ -37,15 +38,15 @@ pub enum TurntableAddress {
 pub struct SimulatedAddress {
     /// How many times faster than real time it runs; 0: as fast as possible.
     pub speed: f64,
-    /// The faults to inject, as [`TableFaults`](crate::simulator::TableFaults) reads them.
-    pub fault: Option<String>,
+    /// The faults to inject.
+    pub faults: TableFaults,
 }
 
 impl Default for SimulatedAddress {
     fn default() -> Self {
         Self {
             speed: 1.0,
-            fault: None,
+            faults: TableFaults::default(),
         }
     }
 }
@@ -90,7 +91,11 @@ fn simulated(rest: &str) -> Result<SimulatedAddress, String> {
                 let factor = factor.parse().ok().filter(usable);
                 address.speed = factor.ok_or("a speed is a number from 0 on, as in speed=10")?;
             }
-            Some(("fault", fault)) if !fault.is_empty() => address.fault = Some(fault.to_owned()),
+            Some(("fault", faults)) => {
+                address.faults = faults
+                    .parse()
+                    .map_err(|fault: SimulatorError| fault.to_string())?;
+            }
             _ => {
                 return Err(format!(
                     "unknown option {option:?}: the options are speed= and fault="
@@ -184,10 +189,13 @@ mod tests {
             read("sim:"),
             TurntableAddress::Simulated(SimulatedAddress::default())
         );
-        let fault = Some("drop=0.01,reset@12.5s".to_owned());
-        let simulated = SimulatedAddress { speed: 10.0, fault };
+        let faults = "stall@20s,reset@12.5s".parse().unwrap();
+        let simulated = SimulatedAddress {
+            speed: 10.0,
+            faults,
+        };
         assert_eq!(
-            read("sim:?speed=10&fault=drop=0.01,reset@12.5s"),
+            read("sim:?speed=10&fault=stall@20s,reset@12.5s"),
             TurntableAddress::Simulated(simulated)
         );
     }

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use relit_data::clock::Clock;
-use relit_turntable::simulator::{Simulator, SimulatorError, SimulatorOptions, TableFaults};
+use relit_turntable::simulator::{Simulator, SimulatorError, SimulatorOptions};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::turntable_arguments::SimulateArguments;
@@ -21,7 +21,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
             1.0 => Clock::monotonic(),
             factor => Clock::paced(factor),
         },
-        faults: asked.fault.join(",").parse::<TableFaults>()?,
+        faults: asked.fault.clone().unwrap_or_default(),
         ..SimulatorOptions::default()
     };
     let simulator = Simulator::start(&options, asked.link.as_deref())?;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use relit_turntable::TurntableAddress;
+use relit_turntable::simulator::TableFaults;
 
 pub(crate) const TURNTABLE_EXAMPLES: &str = "\
 Examples:
@@ -24,12 +25,10 @@ pub(crate) const SIMULATE_EXAMPLES: &str = "\
 Examples:
   relit-capture simulate --link /tmp/table
       then, in another terminal: relit-capture turntable --turntable serial:/tmp/table status
-  relit-capture simulate --fault drop=0.01,flip=0.005 --fault reset@12.5s
-      a bad line, and a controller that restarts
+  relit-capture simulate --fault reset@12.5s,stall@20s
+      a controller that restarts, and then hangs
 
-Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
-`to.` or `from.` before them for one direction; reset@TIME and stall@TIME; estop@TIME
-or estop@TIME:TIME presses the emergency stop, for good or for a time.";
+Faults: reset@TIME restarts the controller, stall@TIME hangs it, estop@TIME presses the emergency stop.";
 
 #[derive(Args)]
 pub(crate) struct TurntableArguments {
@@ -72,9 +71,9 @@ pub(crate) struct SimulateArguments {
     /// Speed, as a multiple of real time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub(crate) speed: f64,
-    /// A fault, such as drop=0.01 or reset@12.5s; may be repeated.
-    #[arg(long, value_name = "FAULT")]
-    pub(crate) fault: Vec<String>,
+    /// Faults, such as reset@12.5s.
+    #[arg(long, value_name = "FAULTS")]
+    pub(crate) fault: Option<TableFaults>,
 }
 
 fn degrees(text: &str) -> Result<f64, String> {

@@ -179,7 +179,7 @@ fn what_is_wrong_is_said_in_a_sentence() {
         .args(["simulate", "--fault", "gremlins=1"])
         .output()
         .unwrap();
-    assert_eq!(fault.status.code(), Some(1));
+    assert_eq!(fault.status.code(), Some(2));
     assert!(err(&fault).contains("gremlins"), "{}", err(&fault));
     let address = Command::new(PROGRAM)
         .args(["turntable", "--turntable", "usb:3", "status"])

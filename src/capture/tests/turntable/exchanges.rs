@@ -5,7 +5,7 @@
 
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
-use relit_turntable::simulator::SimulatorOptions;
+use relit_turntable::simulator::SerialFaults;
 use relit_turntable::{ControllerState, Table, TurntableError};
 
 use crate::rig::{Rig, STEP_DEG};
@@ -133,13 +133,19 @@ fn exchanged(table: &Table) -> u64 {
     counts.lines + counts.reports
 }
 
-fn faults() -> &'static str {
-    "drop=0.001,flip=0.001,duplicate=0.01,merge=0.005"
+fn faults() -> SerialFaults {
+    SerialFaults {
+        drop: 0.001,
+        flip: 0.001,
+        duplicate: 0.01,
+        merge: 0.005,
+        ..SerialFaults::default()
+    }
 }
 
 #[test]
 fn no_motion_is_wrong_or_doubled_over_a_bad_wire() {
-    let rig = Rig::new(faults());
+    let rig = Rig::wired(faults(), 0);
     let outcome = run(&rig, 3000, 1);
     println!("{outcome:?}");
     assert!(outcome.wrong.is_empty(), "{:?}", outcome.wrong);
@@ -149,7 +155,15 @@ fn no_motion_is_wrong_or_doubled_over_a_bad_wire() {
 
 #[test]
 fn without_checksums_no_motion_is_wrong_or_doubled_either() {
-    let rig = Rig::new("drop=0.0005,duplicate=0.01,merge=0.005").plain();
+    let rig = Rig::wired(
+        SerialFaults {
+            drop: 0.0005,
+            flip: 0.0,
+            ..faults()
+        },
+        0,
+    )
+    .plain();
     let outcome = run(&rig, 3000, 3);
     println!("{outcome:?}");
     assert!(outcome.wrong.is_empty(), "{:?}", outcome.wrong);
@@ -158,14 +172,10 @@ fn without_checksums_no_motion_is_wrong_or_doubled_either() {
 #[test]
 #[ignore = "takes minutes; see the module's documentation"]
 fn a_hundred_thousand_exchanges() {
-    let seeded = || SimulatorOptions {
-        seed: 7,
-        ..SimulatorOptions::default()
-    };
-    let rig = Rig::with(faults(), seeded());
+    let rig = Rig::wired(faults(), 7);
     let checked = run(&rig, 100_000, 2);
     println!("checked lines: {checked:#?}");
-    let rig = Rig::with(faults(), seeded()).plain();
+    let rig = Rig::wired(faults(), 7).plain();
     let plain = run(&rig, 100_000, 2);
     println!("plain Grbl: {plain:#?}");
     assert!(checked.wrong.is_empty(), "{:?}", checked.wrong);

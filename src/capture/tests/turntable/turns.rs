@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use relit_turntable::simulator::SimulatorOptions;
+use relit_turntable::simulator::{SerialFaults, SimulatorOptions};
 use relit_turntable::{ControllerState, HomingResult, MotionFault, TurntableError};
 
 use crate::rig::{PacedRig, Rig, STEP_DEG, paper_turn, spread, turn_by};
@@ -12,13 +12,13 @@ const FRAME_US: i64 = 33_333;
 
 #[test]
 fn every_frame_of_a_turn_gets_its_angle() {
-    let p99 = turn_and_compare(&Rig::with("", drifting()));
+    let p99 = turn_and_compare(&Rig::with(drifting()));
     assert!(p99 <= 0.01, "p99 {p99}");
 }
 
 #[test]
 fn without_the_chips_time_every_frame_of_a_turn_gets_its_angle_too() {
-    let p99 = turn_and_compare(&Rig::with("", drifting()).plain());
+    let p99 = turn_and_compare(&Rig::with(drifting()).plain());
     assert!(p99 <= 0.01, "p99 {p99}");
 }
 
@@ -157,7 +157,16 @@ fn check_stands(rig: &Rig) {
 
 #[test]
 fn a_bad_wire_costs_repetitions_and_no_angle() {
-    let rig = Rig::new("drop=0.0005,flip=0.0005,duplicate=0.005,merge=0.002");
+    let rig = Rig::wired(
+        SerialFaults {
+            drop: 0.0005,
+            flip: 0.0005,
+            duplicate: 0.005,
+            merge: 0.002,
+            ..SerialFaults::default()
+        },
+        0,
+    );
     let table = rig.open();
     table.home().unwrap();
     let zero = rig.truth();

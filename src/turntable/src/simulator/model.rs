@@ -39,8 +39,8 @@ impl Timebase {
 enum Event {
     Restart,
     Stall,
-    /// The emergency stop is pressed or released.
-    EmergencyStop(bool),
+    /// The emergency stop is pressed.
+    EmergencyStop,
 }
 
 /// A simulated table at some time. Every method that takes a time advances it to that time first.
@@ -110,8 +110,8 @@ impl Model {
         match event {
             Event::Restart => self.chip.restart(ResetCause::Watchdog),
             Event::Stall => self.chip.stall(),
-            Event::EmergencyStop(pressed) => {
-                self.pins.emergency = pressed;
+            Event::EmergencyStop => {
+                self.pins.emergency = true;
                 self.chip.set_pins(self.pins);
             }
         }
@@ -164,11 +164,6 @@ impl Model {
 fn events(faults: &TableFaults) -> impl Iterator<Item = (Duration, Event)> {
     let restarts = faults.resets.iter().map(|at| (*at, Event::Restart));
     let stall = faults.stall.iter().map(|at| (*at, Event::Stall));
-    let presses = faults.emergency_stops.iter().flat_map(|&(at, lasts)| {
-        let press = (at, Event::EmergencyStop(true));
-        let release = lasts.map(|lasts| at.saturating_add(lasts));
-        let release = release.map(|at| (at, Event::EmergencyStop(false)));
-        std::iter::once(press).chain(release)
-    });
-    restarts.chain(stall).chain(presses)
+    let press = faults.emergency_stop.map(|at| (at, Event::EmergencyStop));
+    restarts.chain(stall).chain(press)
 }
