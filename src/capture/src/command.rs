@@ -90,9 +90,6 @@ pub trait Rig: Send + Sync {
     /// The state and the newest picture.
     fn monitor(&self) -> &Monitor;
 
-    /// Whether commands are still carried out: false once what does so has ended or failed.
-    fn is_running(&self) -> bool;
-
     /// The folder in which sessions lie.
     fn root(&self) -> &Path;
 }

@@ -6,7 +6,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use relit_capture::processing::ProcessingPrograms;
-use relit_capture::serve::Heartbeat;
 use sd_notify::NotifyState;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -14,14 +13,6 @@ use signal_hook::low_level::emulate_default_handler;
 
 /// Signals within this time count as one: `timeout` and a closing terminal send several.
 const TOGETHER: Duration = Duration::from_secs(1);
-
-/// What the service manager that started the program wants to hear all the time, where one does.
-pub(crate) fn heartbeat() -> Option<Heartbeat> {
-    Some(Heartbeat {
-        period: sd_notify::watchdog_enabled()? / 3,
-        beat: Box::new(|| notify_service(&[NotifyState::Watchdog])),
-    })
-}
 
 /// Says something to the service manager that started the program, where one did.
 pub(crate) fn notify_service(states: &[NotifyState<'_>]) {

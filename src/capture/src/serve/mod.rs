@@ -20,7 +20,6 @@ mod permits;
 mod pictures;
 mod preview;
 mod processing;
-mod results;
 mod routes;
 mod sessions;
 mod trash;
@@ -33,9 +32,8 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 
 use relit_web::PageServer;
-use tokio::time::{MissedTickBehavior, interval};
 
-pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
+pub use self::options::{ClientLimits, ServeOptions};
 use crate::command::Rig;
 pub use relit_web::{Announcement, ListenAddress, Shutdown, Token};
 
@@ -99,29 +97,8 @@ pub fn serve(
         let app = routes::App::new(rig, policy, options.limits, shutdown, options.processing);
         routes::router(&app)
     };
-    let begun = |announcement: &Announcement| {
-        announce(announcement);
-        if let Some(heartbeat) = options.heartbeat {
-            tokio::spawn(beat(heartbeat, rig.clone()));
-        }
-    };
-    let served = server.serve(router, begun, shutdown);
+    let served = server.serve(router, announce, shutdown);
     served.map_err(|source| ServeError { address, source })
-}
-
-/// Beats for as long as server and rig run: that this continues means that threads run and the monitor's
-/// locks come free.
-async fn beat(heartbeat: Heartbeat, rig: Arc<dyn Rig>) {
-    let mut ticks = interval(heartbeat.period);
-    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    loop {
-        ticks.tick().await;
-        let _readable = rig.monitor().state();
-        if !rig.is_running() {
-            return;
-        }
-        (heartbeat.beat)();
-    }
 }
 
 /// Lets every other thread of the process go first. Linux keeps this value for each thread; where the

@@ -1,6 +1,5 @@
 //! Where, for whom and within which limits the rig is served.
 
-use std::fmt;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,8 +19,6 @@ pub struct ServeOptions {
     /// Names, without port, under which clients reach this machine besides its addresses, such as
     /// `rig.local`. The first one stands in the announced URL.
     pub names: Vec<String>,
-    /// Called all the time while the server is alive.
-    pub heartbeat: Option<Heartbeat>,
     /// What clients may take up.
     pub limits: ClientLimits,
     /// What makes masks and data sets of the sessions, where that is done here.
@@ -35,28 +32,9 @@ impl ServeOptions {
             address,
             token: None,
             names: Vec::new(),
-            heartbeat: None,
             limits: ClientLimits::default(),
             processing: None,
         }
-    }
-}
-
-/// How a supervisor, such as the service manager, learns that the server is alive.
-pub struct Heartbeat {
-    /// Time between two beats.
-    pub period: Duration,
-    /// Called while requests are worked on, the rig's state can be read, and the
-    /// [rig runs](crate::command::Rig::is_running); dropped when that is over.
-    pub beat: Box<dyn Fn() + Send + Sync>,
-}
-
-impl fmt::Debug for Heartbeat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut heartbeat = f.debug_struct("Heartbeat");
-        heartbeat
-            .field("period", &self.period)
-            .finish_non_exhaustive()
     }
 }
 

@@ -47,7 +47,6 @@ struct Fake {
     monitor: Monitor,
     root: PathBuf,
     told: Mutex<Vec<Command>>,
-    failed: AtomicBool,
     /// Whether it refuses what its state does not allow, as the daemon does.
     minds_state: AtomicBool,
 }
@@ -72,10 +71,6 @@ impl Rig for Fake {
 
     fn monitor(&self) -> &Monitor {
         &self.monitor
-    }
-
-    fn is_running(&self) -> bool {
-        !self.failed.load(Ordering::Relaxed)
     }
 
     fn root(&self) -> &Path {
@@ -123,7 +118,6 @@ impl Serving {
             monitor: Monitor::default(),
             root: root.path().to_owned(),
             told: Mutex::new(Vec::new()),
-            failed: AtomicBool::new(false),
             minds_state: AtomicBool::new(false),
         });
         let mut options = ServeOptions::at("127.0.0.1:0".parse().unwrap());

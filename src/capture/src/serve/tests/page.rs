@@ -1,9 +1,5 @@
-use std::sync::atomic::Ordering;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant};
-
-use super::{LONG, Serving};
-use crate::serve::{Heartbeat, page};
+use super::Serving;
+use crate::serve::page;
 
 #[test]
 fn the_page_and_its_files_are_served_and_need_nothing_else() {
@@ -63,45 +59,4 @@ fn scripts_set_text_never_markup_and_look_only_for_what_the_page_has() {
             }
         }
     }
-}
-
-/// A server whose beats come through a channel, which closes when there will be no more.
-fn beating() -> (Serving, Receiver<()>) {
-    let (sender, beats) = mpsc::sync_channel(64);
-    let serving = Serving::with(|options| {
-        options.heartbeat = Some(Heartbeat {
-            period: Duration::from_millis(5),
-            beat: Box::new(move || {
-                let _ = sender.try_send(());
-            }),
-        });
-    });
-    (serving, beats)
-}
-
-/// Takes the beats that are left, until there will be no more.
-fn wait_end(beats: &Receiver<()>) {
-    let began = Instant::now();
-    while beats.recv_timeout(LONG) != Err(RecvTimeoutError::Disconnected) {
-        assert!(began.elapsed() < LONG, "it beats on");
-    }
-}
-
-#[test]
-fn a_supervisor_hears_that_the_server_is_alive_until_it_ends() {
-    let (mut serving, beats) = beating();
-    for _ in 0..3 {
-        beats.recv_timeout(LONG).unwrap();
-    }
-    serving.stop();
-    wait_end(&beats);
-}
-
-#[test]
-fn a_supervisor_hears_nothing_more_once_the_rig_has_failed() {
-    let (serving, beats) = beating();
-    beats.recv_timeout(LONG).unwrap();
-    serving.rig.failed.store(true, Ordering::Relaxed);
-    wait_end(&beats);
-    assert_eq!(serving.get("/").status, 200);
 }
