@@ -10,7 +10,7 @@ use relit_capture::state::{LogLine, Phase, RigState, Verdict};
 use relit_data::causes::with_causes;
 use relit_data::session::{Manifest, SessionWriter};
 use relit_tests::is_named;
-use relit_turntable::lockfile::{LockError, use_folder};
+use relit_turntable::SerialPort;
 
 use crate::support::{SHORT, fixture};
 
@@ -24,7 +24,6 @@ fn settings(root: &Path, camera: &str, table: &str) -> Settings {
         camera.parse().unwrap(),
         table.parse().unwrap(),
     );
-    settings.runtime_folder = root.to_owned();
     settings.degrees_per_second = 36.0;
     settings.retries = 0;
     settings
@@ -148,13 +147,10 @@ fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
 #[test]
 fn a_fault_is_shown_with_its_cause() {
     let root = tempfile::tempdir().unwrap();
-    let mut settings = settings(root.path(), "", "serial:/dev/null");
-    settings.runtime_folder = root.path().join("no-folder");
-    std::fs::write(&settings.runtime_folder, "").unwrap();
-    let daemon = Daemon::start(settings).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "serial:/dev/null")).unwrap();
     let state = once(&daemon, |state| state.table.fault.is_some());
     let fault = state.table.fault.unwrap();
-    let cause = use_folder(&root.path().join("no-folder")).unwrap_err();
+    let cause = SerialPort::open(Path::new("/dev/null")).unwrap_err();
     assert!(fault.contains(&with_causes(&cause)), "{fault}");
     once(&daemon, |state| {
         state.faults.iter().any(|line| line.what == fault)
@@ -166,7 +162,7 @@ fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
     let root = tempfile::tempdir().unwrap();
     let _first = Daemon::start(settings(root.path(), "", "none")).unwrap();
     let error = Daemon::start(settings(root.path(), "", "none")).unwrap_err();
-    let CaptureError::Lock(LockError::Held { pid, .. }) = error else {
+    let CaptureError::InUse { pid, .. } = error else {
         panic!("{error}");
     };
     assert_eq!(pid, Some(std::process::id()));

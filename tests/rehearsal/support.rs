@@ -60,7 +60,6 @@ impl Rehearsal {
             camera.parse().unwrap(),
             table.parse().unwrap(),
         );
-        settings.runtime_folder = root.path().to_owned();
         settings.retries = 0;
         change(&mut settings);
         let equipment = Equipment::new(settings).unwrap();

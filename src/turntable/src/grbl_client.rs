@@ -15,7 +15,6 @@ use super::port::{self, Port, SerialPort};
 use super::protocol::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
 use super::status::TableStatus;
 use super::supervisor::{MotionFault, MotionGoal};
-use crate::lockfile::LockFile;
 use relit_data::clock::Clock;
 
 /// Added to the computed time of a motion.
@@ -28,10 +27,8 @@ const BRISK: f64 = 30.0;
 
 /// A table, owned by this process. Dropping it stops the table.
 pub struct Table {
-    // Fields are dropped in this order: the port is closed, and only then its lock is released.
     connection: Connection,
     _io_thread: IoThread,
-    _lock: Option<LockFile>,
     identity: Identity,
     was_stopped: bool,
 }
@@ -41,9 +38,18 @@ impl Table {
     /// and reads its identity and settings.
     ///
     /// # Errors
-    /// [`TurntableError::NoController`], or what else failed during the exchange.
+    /// [`TurntableError::Failed`], or what else failed during the exchange.
     pub fn open(port: impl Port, options: &TableOptions) -> Result<Table, TurntableError> {
-        Self::handshake(Box::new(port), None, options)
+        let resets = port.resets();
+        let unknown = handshake::unknown_controller();
+        let (connection, io_thread) = Connection::start(Box::new(port), &options.clock, unknown)?;
+        let (identity, was_stopped) = handshake::run(&connection, resets, options)?;
+        Ok(Table {
+            connection,
+            _io_thread: io_thread,
+            identity,
+            was_stopped,
+        })
     }
 
     /// Opens a serial port exclusively.
@@ -51,10 +57,7 @@ impl Table {
     /// # Errors
     /// [`TurntableError::Owned`] if another process has it, and the errors of [`Table::open`].
     pub fn open_serial(path: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
-        // Opening the port resets an Arduino: this must not happen to another owner's table.
-        let lock = port::claim(path, &options.runtime_folder)?;
-        let port = SerialPort::open(path)?;
-        Self::handshake(Box::new(port), Some(lock), options)
+        Self::open(SerialPort::open(path)?, options)
     }
 
     /// The same, and ends a program of the toolkit that has the port, which stops its table then.
@@ -69,7 +72,7 @@ impl Table {
                 Err(error @ TurntableError::Owned { pid, .. }) => (pid, error),
                 opened => return opened,
             };
-            if !is_asked && port::has_open(pid, path, &options.runtime_folder) {
+            if !is_asked && let Some(pid) = pid.filter(|&pid| port::is_ours(pid)) {
                 let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
                 is_asked = pid.is_some_and(|pid| kill_process(pid, Signal::TERM).is_ok());
             }
@@ -78,24 +81,6 @@ impl Table {
             }
             options.clock.sleep(LOOK);
         }
-    }
-
-    fn handshake(
-        port: Box<dyn Port>,
-        lock: Option<LockFile>,
-        options: &TableOptions,
-    ) -> Result<Table, TurntableError> {
-        let resets = port.resets();
-        let (connection, io_thread) =
-            Connection::start(port, &options.clock, handshake::unknown_controller())?;
-        let (identity, was_stopped) = handshake::run(&connection, resets, options)?;
-        Ok(Table {
-            connection,
-            _io_thread: io_thread,
-            _lock: lock,
-            identity,
-            was_stopped,
-        })
     }
 
     /// The controller's identity and settings.
@@ -124,7 +109,7 @@ impl Table {
     /// The table's present status.
     ///
     /// # Errors
-    /// [`TurntableError::Silent`].
+    /// [`TurntableError::Failed`].
     pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.connection.status()
     }
@@ -138,7 +123,7 @@ impl Table {
     /// at most 30.
     ///
     /// # Errors
-    /// [`TurntableError::BeyondLimit`], [`TurntableError::NotReady`], or what ended the motion.
+    /// [`TurntableError::Failed`], [`TurntableError::NotReady`], or what ended the motion.
     pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<TableStatus, TurntableError> {
         let speed = speed.unwrap_or_else(|| self.default_speed());
         self.identity.check_speed(speed)?;
@@ -153,11 +138,9 @@ impl Table {
         let (low_deg, high_deg) = self.identity.limits_from(&status);
         let target_deg = status.angle_deg + degrees;
         if !(low_deg..=high_deg).contains(&target_deg) {
-            return Err(TurntableError::BeyondLimit {
-                target_deg,
-                low_deg,
-                high_deg,
-            });
+            return Err(TurntableError::Failed(format!(
+                "{target_deg:.3} degrees is beyond the limits {low_deg:.3} to {high_deg:.3}: go there the other way round, so that the cable unwinds"
+            )));
         }
         let machine_deg = status.machine_deg + degrees;
         // An absolute target: a line that is executed twice still moves the table once.

@@ -55,7 +55,6 @@ mod handshake;
 mod homing;
 mod identity;
 mod io_thread;
-pub mod lockfile;
 mod plan;
 mod port;
 pub mod protocol;
@@ -65,8 +64,6 @@ mod supervisor;
 #[cfg(test)]
 mod tests;
 mod turn;
-
-use std::path::PathBuf;
 
 use relit_data::clock::Clock;
 
@@ -79,7 +76,7 @@ pub use grbl_client::Table;
 pub use homing::HomingResult;
 pub use identity::Identity;
 pub use plan::{MARGIN_DEG, TurnPlan};
-pub use port::{Port, SerialPort};
+pub use port::{Port, SerialPort, holder};
 pub use protocol::{ControllerState, Counts, LineFault, SendError};
 pub use status::TableStatus;
 pub use supervisor::MotionFault;
@@ -90,8 +87,6 @@ pub use turn::{FinishedTurn, Turn};
 pub struct TableOptions {
     /// The clock of all waits and time stamps. A simulated table needs the clock of its simulator.
     pub clock: Clock,
-    /// Folder for the lock of a port's owner: one that every program on the machine agrees on, such as [`lockfile::standard_folder`].
-    pub runtime_folder: PathBuf,
     /// Whether to use what the rig's firmware offers beyond Grbl. If false, it is treated as a stock
     /// board.
     pub extras: bool,
@@ -101,7 +96,6 @@ impl Default for TableOptions {
     fn default() -> Self {
         Self {
             clock: Clock::monotonic(),
-            runtime_folder: lockfile::standard_folder(),
             extras: true,
         }
     }

@@ -3,13 +3,12 @@
 use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use serialport::{SerialPort as _, TTYPort};
 
 use super::error::TurntableError;
-use crate::lockfile::{self, LockError, LockFile};
 
 /// Grbl's baud rate, bits/s.
 const BAUD: u32 = 115_200;
@@ -38,41 +37,25 @@ pub trait Port: Send + 'static {
     fn resets(&self) -> bool;
 }
 
-/// Makes this process the owner of `port`, without opening it: opening an Arduino's port resets it. The lock
-/// is named by the port's device number, so that every name of the port leads to it.
-pub(super) fn claim(port: &Path, folder: &Path) -> Result<LockFile, TurntableError> {
-    let device = fs::metadata(port).map_err(|source| TurntableError::Open {
-        path: port.to_owned(),
-        source,
-    })?;
-    lockfile::use_folder(folder)?;
-    LockFile::take(&lock_of(&device, folder), &port.display().to_string()).map_err(|error| {
-        match error {
-            LockError::Held { pid, .. } => TurntableError::Owned {
-                path: port.to_owned(),
-                pid: pid.unwrap_or(0),
-            },
-            error => error.into(),
-        }
-    })
-}
-
-/// Whether a process really has the lock of a port open: the number in a lock file is only what somebody wrote there.
-pub(super) fn has_open(pid: u32, port: &Path, folder: &Path) -> bool {
-    let lock = fs::metadata(port)
-        .map(|device| lock_of(&device, folder))
-        .and_then(fs::metadata);
-    let files = fs::read_dir(format!("/proc/{pid}/fd"));
-    let (Ok(lock), Ok(files)) = (lock, files) else {
-        return false;
+/// The number of a process that has a file open, as far as this account may see it; of several, one of this program.
+pub fn holder(file: &Path) -> Option<u32> {
+    let file = fs::metadata(file).ok()?;
+    let has_open = |pid: &u32| {
+        let files = fs::read_dir(format!("/proc/{pid}/fd"))
+            .into_iter()
+            .flatten();
+        let mut files = files.filter_map(|open| fs::metadata(open.ok()?.path()).ok());
+        files.any(|open| (open.dev(), open.ino()) == (file.dev(), file.ino()))
     };
-    files
-        .filter_map(|file| fs::metadata(file.ok()?.path()).ok())
-        .any(|file| (file.dev(), file.ino()) == (lock.dev(), lock.ino()))
+    let processes = fs::read_dir("/proc").ok()?.flatten();
+    let pids = processes.filter_map(|process| process.file_name().to_str()?.parse().ok());
+    pids.filter(has_open).min_by_key(|&pid| !is_ours(pid))
 }
 
-fn lock_of(device: &fs::Metadata, folder: &Path) -> PathBuf {
-    folder.join(format!("turntable-{:x}.lock", device.rdev()))
+/// Whether a process is one of this program.
+pub(super) fn is_ours(pid: u32) -> bool {
+    let name = |pid| fs::read(format!("/proc/{pid}/comm")).ok();
+    name(pid).is_some_and(|theirs| name(std::process::id()) == Some(theirs))
 }
 
 /// A serial port, opened exclusively.
@@ -84,16 +67,23 @@ pub struct SerialPort {
 }
 
 impl SerialPort {
-    /// Opens a port exclusively, at Grbl's baud rate.
+    /// Opens a port exclusively, at Grbl's baud rate. An Arduino's port that its owner has open is not reset by that.
     ///
     /// # Errors
-    /// [`TurntableError::Open`].
+    /// [`TurntableError::Owned`] if another process has it, or [`TurntableError::Open`].
     pub fn open(path: &Path) -> Result<SerialPort, TurntableError> {
         let name = path.display().to_string();
         let settings = serialport::new(name.clone(), BAUD).timeout(WRITE_WAIT);
-        let open = |source: serialport::Error| TurntableError::Open {
-            path: path.to_owned(),
-            source: source.into(),
+        let open = |source: serialport::Error| match source.kind() {
+            // The library's word for a port that is locked.
+            serialport::ErrorKind::NoDevice => TurntableError::Owned {
+                path: path.to_owned(),
+                pid: holder(path),
+            },
+            _ => TurntableError::Open {
+                path: path.to_owned(),
+                source: source.into(),
+            },
         };
         let mut port = TTYPort::open(&settings).map_err(open)?;
         // A port without modem lines, such as a pseudoterminal, cannot reset the controller.

@@ -33,6 +33,12 @@ impl Device {
         Ok((device, info))
     }
 
+    /// Takes it for this process, until it is closed.
+    pub(super) fn claim(&self) -> Result<(), CameraError> {
+        let locked = self.node.lock();
+        locked.map_err(|error| self.error("it was locked", error))
+    }
+
     pub(super) fn name(&self) -> String {
         self.path.display().to_string()
     }

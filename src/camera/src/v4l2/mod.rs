@@ -26,6 +26,7 @@ pub(super) struct V4l2Camera {
 impl V4l2Camera {
     pub(super) fn open(path: &Path) -> Result<Self, CameraError> {
         let (device, info) = Device::open(path)?;
+        device.claim()?;
         Ok(Self {
             device,
             info,

@@ -62,7 +62,7 @@ impl Equipment {
         let simulator = match &settings.turntable {
             TurntableAddress::Simulated(address) => Some(SimulatedTable::new(&SimulatorOptions {
                 clock: clock.clone(),
-                faults: address.fault.as_deref().unwrap_or_default().parse()?,
+                faults: address.faults.clone(),
                 ..SimulatorOptions::default()
             })),
             _ => None,
@@ -133,7 +133,6 @@ impl Equipment {
     fn connect(&self) -> Result<Option<Table>, CaptureError> {
         let options = TableOptions {
             clock: self.clock.clone(),
-            runtime_folder: self.settings.runtime_folder.clone(),
             ..TableOptions::default()
         };
         if let Some(simulator) = &self.simulator {

@@ -1,11 +1,11 @@
 //! What keeps a turn from being captured, each with the way out.
 
 use std::io;
+use std::path::PathBuf;
 
 use super::recording::RecordingError;
 use relit_camera::CameraError;
 use relit_turntable::TurntableError;
-use relit_turntable::lockfile::LockError;
 use relit_turntable::simulator;
 
 /// Why a capture failed.
@@ -32,9 +32,14 @@ pub enum CaptureError {
     /// Something is not there at the moment; what, and what to do.
     #[error("{0}")]
     Missing(String),
-    /// Another process has the camera or the folder, or that cannot be known.
-    #[error(transparent)]
-    Lock(#[from] LockError),
+    /// Another daemon has the folder of sessions.
+    #[error("{root} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]
+    InUse {
+        /// The folder.
+        root: PathBuf,
+        /// Who has it, where that is known.
+        pid: Option<u32>,
+    },
     /// The recording ended before the turn, or long after it.
     #[error("the recording did not end with the turn")]
     NotWithTheTurn,

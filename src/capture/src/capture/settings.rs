@@ -8,7 +8,6 @@ use crate::state::CaptureSettings;
 use relit_camera::CameraAddress;
 use relit_camera::manual_controls::ManualValues;
 use relit_turntable::TurntableAddress;
-use relit_turntable::lockfile::{self, LockError, LockFile};
 
 /// Where a capture's parts are and what it is to be like.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +28,6 @@ pub struct Settings {
     pub max_dropped: u64,
     /// How often a take that came out bad is repeated.
     pub retries: u32,
-    /// Where those who use cameras and serial ports leave their locks.
-    pub runtime_folder: PathBuf,
     /// The commit that the program was built from, or nothing.
     pub commit: String,
 }
@@ -48,7 +45,6 @@ impl Settings {
             degrees_per_second: 7.2,
             max_dropped: 0,
             retries: 1,
-            runtime_folder: lockfile::standard_folder(),
             commit: String::new(),
         }
     }
@@ -64,19 +60,6 @@ impl Settings {
             degrees_per_second: self.degrees_per_second,
             max_dropped: self.max_dropped,
             retries: self.retries,
-        }
-    }
-
-    /// Takes the camera for this process; `None` for one that any number of programs can have.
-    ///
-    /// # Errors
-    /// [`LockError::Held`] with the holder's process number, or what the file system answers.
-    pub fn lock_camera(&self) -> Result<Option<LockFile>, LockError> {
-        match &self.camera {
-            CameraAddress::V4l2(path) => {
-                LockFile::lock_device(path, &self.runtime_folder).map(Some)
-            }
-            _ => Ok(None),
         }
     }
 

@@ -21,7 +21,6 @@ pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome
         if !asked.turn.yes && !agreed(console, &settings)? {
             return Ok(Outcome::Failure);
         }
-        let _camera = settings.lock_camera()?;
         let mut equipment = Equipment::new(settings)?;
         let stop = StopRequest::new(&equipment.clock());
         let ending = stop.clone();

@@ -25,7 +25,6 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
     let RecordArguments { object, turn } = record;
     let settings: Settings = turn.rig.into();
     let _made = make_root(&settings)?;
-    let _camera = settings.lock_camera()?;
     report_recovered(console, &settings)?;
     let mut equipment = Equipment::new(settings)?;
     // Without a camera there is nothing to agree to.

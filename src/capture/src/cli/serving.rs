@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use relit_capture::capture::{CaptureError, Settings};
 use relit_capture::command::Rig;
-use relit_capture::daemon::Daemon;
+use relit_capture::daemon::{Daemon, forget_root};
 use relit_capture::processing::{Processing, ProcessingOptions};
 use relit_capture::serve::{Announcement, ServeOptions, Shutdown, Token, check_address, serve};
-use relit_turntable::lockfile::LockFile;
 use sd_notify::NotifyState;
 
 use super::arguments::ServeArguments;
-use super::environment::{at_end, heartbeat, notify_service, programs};
+use super::environment::{at_end, notify_service, programs};
 use relit_console::{Console, Event, Outcome};
 use relit_data::durable::CreatedFolder;
 
@@ -35,7 +34,7 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
     at_end(end).map_err(CaptureError::system("the signals", "listened to"))?;
     let rig = Daemon::start(settings).inspect_err(|_| {
         if made.is_new() {
-            LockFile::forget_root(root);
+            forget_root(root);
         }
     })?;
     let rig = Arc::new(rig);
@@ -53,7 +52,6 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
         processing: Some(Arc::clone(&processing)),
         token,
         names,
-        heartbeat: heartbeat(),
         ..ServeOptions::at(address)
     };
     serve(rig.clone(), options, &shutdown, |announcement| {

@@ -7,11 +7,13 @@
 
 mod dispatcher;
 mod idle;
+mod root_lock;
 mod worker;
 
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use crate::capture::{CaptureError, Equipment, Settings, preflight, recover};
@@ -20,8 +22,8 @@ use crate::preview::Preview;
 use crate::state::{Monitor, RigState};
 use dispatcher::Dispatcher;
 use relit_data::clock::{Clock, JoinHandle};
-use relit_turntable::lockfile::LockFile;
 use relit_turntable::simulator::SimulatedTable;
+pub use root_lock::forget_root;
 use worker::Worker;
 
 /// Farthest that a table is turned by one command, degrees.
@@ -34,20 +36,18 @@ pub struct Daemon {
     root: PathBuf,
     simulator: Option<SimulatedTable>,
     worker: Mutex<Option<JoinHandle<()>>>,
-    _locks: (LockFile, Option<LockFile>),
+    _lock: File,
 }
 
 impl Daemon {
-    /// Takes folder and camera for this process, recovers sessions whose recorder died, and starts
+    /// Takes the folder for this process, recovers sessions whose recorder died, and starts
     /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
-    /// [`CaptureError::Lock`] if another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
+    /// [`CaptureError::InUse`] if another daemon has it, [`CaptureError::Refused`] for speeds that do not fit, or what
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
-        // The lock of the folder is a file in it: nothing is left there where the camera is another's.
-        let camera = settings.lock_camera()?;
-        let locks = (LockFile::lock_root(&settings.root)?, camera);
+        let lock = root_lock::lock(&settings.root)?;
         let root = settings.root.clone();
         let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;
@@ -66,7 +66,7 @@ impl Daemon {
             root,
             simulator,
             worker: Mutex::new(Some(worker)),
-            _locks: locks,
+            _lock: lock,
         })
     }
 
@@ -79,15 +79,12 @@ impl Daemon {
     /// the second time.
     pub fn end(&self) {
         self.dispatcher.end();
-        let worker = self.lock_worker().take();
+        let worker = self.worker.lock();
+        let worker = worker.unwrap_or_else(PoisonError::into_inner).take();
         if let Some(worker) = worker {
             // A panic in there was reported by the thread itself, and its table was stopped.
             let _ = worker.join();
         }
-    }
-
-    fn lock_worker(&self) -> MutexGuard<'_, Option<JoinHandle<()>>> {
-        self.worker.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -113,11 +110,6 @@ impl Rig for Daemon {
 
     fn monitor(&self) -> &Monitor {
         self.dispatcher.monitor()
-    }
-
-    fn is_running(&self) -> bool {
-        let worker = self.lock_worker();
-        worker.as_ref().is_some_and(|worker| !worker.is_finished())
     }
 
     fn root(&self) -> &Path {

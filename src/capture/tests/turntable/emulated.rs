@@ -55,11 +55,8 @@ impl Chip {
     }
 
     fn open(&self) -> Table {
-        let options = TableOptions {
-            runtime_folder: self.folder.path().to_owned(),
-            ..TableOptions::default()
-        };
-        Table::open_serial(&self.folder.path().join("table"), &options).unwrap()
+        let port = self.folder.path().join("table");
+        Table::open_serial(&port, &TableOptions::default()).unwrap()
     }
 
     /// Ends the chip; its steps: microseconds of the monotonic clock, and the angle after each.

@@ -1,9 +1,10 @@
 //! A simulated table and its host, on virtual time or at a port in real time.
 
 use relit_data::clock::{Clock, Participant};
-use relit_turntable::simulator::{SimulatedTable, Simulator, SimulatorOptions};
+use relit_turntable::simulator::{
+    SerialFaults, SimulatedTable, Simulator, SimulatorOptions, TableFaults,
+};
 use relit_turntable::{Table, TableOptions, TurnPlan, TurntableError};
-use tempfile::TempDir;
 
 /// Degrees in one step, at the firmware's default of 88.889 steps a degree.
 pub(crate) const STEP_DEG: f64 = 1.0 / 88.889;
@@ -18,15 +19,33 @@ pub(crate) struct Rig {
 impl Rig {
     /// A table with `faults`.
     pub(crate) fn new(faults: &str) -> Rig {
-        Rig::with(faults, SimulatorOptions::default())
+        Rig::with(SimulatorOptions {
+            faults: match faults {
+                "" => TableFaults::default(),
+                faults => faults.parse().unwrap(),
+            },
+            ..SimulatorOptions::default()
+        })
     }
 
-    pub(crate) fn with(faults: &str, options: SimulatorOptions) -> Rig {
+    /// A table at a bad wire.
+    pub(crate) fn wired(faults: SerialFaults, seed: u64) -> Rig {
+        Rig::with(SimulatorOptions {
+            faults: TableFaults {
+                to_chip: faults,
+                from_chip: faults,
+                ..TableFaults::default()
+            },
+            seed,
+            ..SimulatorOptions::default()
+        })
+    }
+
+    pub(crate) fn with(options: SimulatorOptions) -> Rig {
         let clock = Clock::virtual_time();
         let participant = clock.participate();
         let simulated = SimulatedTable::new(&SimulatorOptions {
             clock: clock.clone(),
-            faults: faults.parse().unwrap(),
             ..options
         });
         Rig {
@@ -64,19 +83,13 @@ impl Rig {
 pub(crate) struct PacedRig {
     pub(crate) simulator: Simulator,
     pub(crate) options: TableOptions,
-    _folder: TempDir,
 }
 
 impl PacedRig {
     pub(crate) fn new(options: &SimulatorOptions) -> PacedRig {
-        let folder = TempDir::new().unwrap();
         PacedRig {
             simulator: Simulator::start(options, None).unwrap(),
-            options: TableOptions {
-                runtime_folder: folder.path().to_owned(),
-                ..TableOptions::default()
-            },
-            _folder: folder,
+            options: TableOptions::default(),
         }
     }
 

@@ -9,7 +9,6 @@ use std::time::Duration;
 
 use serialport::{SerialPort as _, TTYPort};
 
-use crate::lockfile::tests::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 use crate::tests::fake_grbl::FakeGrbl;
 use crate::{Table, TableOptions, TurntableError};
 use relit_data::clock::Clock;
@@ -19,7 +18,6 @@ struct Terminal {
     path: PathBuf,
     quit: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
-    runtime: tempfile::TempDir,
     // Kept open, so that the other end sees no hang-up between two openings.
     _slave: TTYPort,
 }
@@ -45,17 +43,12 @@ impl Terminal {
             path,
             quit,
             thread: Some(thread),
-            runtime: tempfile::tempdir().unwrap(),
             _slave: slave,
         }
     }
 
     fn open(&self) -> Result<Table, TurntableError> {
-        let options = TableOptions {
-            runtime_folder: self.runtime.path().to_owned(),
-            ..TableOptions::default()
-        };
-        Table::open_serial(&self.path, &options)
+        Table::open_serial(&self.path, &TableOptions::default())
     }
 }
 
@@ -71,44 +64,11 @@ fn a_port_has_one_owner_until_it_is_closed() {
     let terminal = Terminal::new();
     let table = terminal.open().unwrap();
     match terminal.open().map(|_| ()) {
-        Err(TurntableError::Owned { pid, .. }) => assert_eq!(pid, std::process::id()),
+        Err(TurntableError::Owned { pid, .. }) => assert_eq!(pid, Some(std::process::id())),
         other => panic!("{other:?}"),
     }
     drop(table);
     assert!(terminal.open().is_ok());
-}
-
-#[test]
-fn a_folder_that_others_can_write_in_is_not_used() {
-    use std::os::unix::fs::PermissionsExt;
-    let terminal = Terminal::new();
-    let open = std::fs::Permissions::from_mode(0o777);
-    std::fs::set_permissions(terminal.runtime.path(), open).unwrap();
-    assert!(matches!(
-        terminal.open().map(|_| ()),
-        Err(TurntableError::Lock(_))
-    ));
-}
-
-#[test]
-fn an_operator_is_told_of_a_service_and_an_outsider_opens_nothing() {
-    let terminal = Terminal::new();
-    if !share(terminal.runtime.path()) {
-        return;
-    }
-    std::os::unix::fs::chown(&terminal.path, Some(SERVICE), None).unwrap();
-    let _table = as_user(SERVICE, || terminal.open()).unwrap();
-    as_user(OPERATOR, || {
-        let opened = terminal.open().map(|_| ());
-        assert!(
-            matches!(opened, Err(TurntableError::Owned { .. })),
-            "{opened:?}"
-        );
-    });
-    as_user(OUTSIDER, || {
-        let opened = terminal.open().map(|_| ());
-        assert!(matches!(opened, Err(TurntableError::Lock(_))), "{opened:?}");
-    });
 }
 
 #[test]

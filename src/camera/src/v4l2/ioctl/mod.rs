@@ -9,7 +9,7 @@ mod buffers;
 mod controls;
 
 use std::ffi::c_void;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::marker::PhantomData;
 use std::mem::{self, size_of};
@@ -19,6 +19,7 @@ use std::path::Path;
 use std::ptr;
 
 use rustix::fs::OFlags;
+use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 use v4l::v4l2;
 use v4l::v4l2::vidioc;
@@ -115,6 +116,14 @@ impl Node {
         let mut options = OpenOptions::new();
         options.read(true).write(true).custom_flags(flags);
         options.open(path).map(Self)
+    }
+
+    /// Takes the node for this process; `EBUSY` if another one has it.
+    pub(super) fn lock(&self) -> io::Result<()> {
+        self.0.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => Errno::BUSY.into(),
+            TryLockError::Error(error) => error,
+        })
     }
 
     /// A call whose structure holds no pointers.
@@ -278,7 +287,6 @@ impl Node {
 
 /// `None` for the errors with which drivers end a list, or report that they have none.
 fn listed(answer: io::Result<()>) -> io::Result<Option<()>> {
-    use rustix::io::Errno;
     match answer {
         Ok(()) => Ok(Some(())),
         Err(error) => match Errno::from_io_error(&error) {
