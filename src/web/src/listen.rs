@@ -1,10 +1,8 @@
 //! Taking connections: so many at once, each with its time limits.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::io;
-use std::net::{IpAddr, SocketAddr};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::{Extension, Router};
@@ -39,8 +37,6 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub struct ConnectionLimits {
     /// Connections at once; further ones wait to be accepted.
     pub connections: usize,
-    /// Connections from one address at once; further ones are closed.
-    pub per_address: usize,
     /// Time in which the first byte has to come after connecting.
     pub first_byte: Duration,
     /// Time in which a request's head has to come, and how long a connection may lie idle.
@@ -53,7 +49,6 @@ impl Default for ConnectionLimits {
     fn default() -> Self {
         Self {
             connections: 256,
-            per_address: 128,
             first_byte: Duration::from_secs(2),
             head: Duration::from_secs(10),
             stall: Duration::from_secs(20),
@@ -149,48 +144,6 @@ async fn run(listener: TcpListener, router: Router, limits: ConnectionLimits, sh
     let _ = timeout(GRACE, connections.acquire_many(all)).await;
 }
 
-/// Connections by address: one client cannot take all of them.
-#[derive(Debug, Default)]
-struct Guests(Mutex<HashMap<IpAddr, usize>>);
-
-/// One connection; ends with it.
-struct Guest {
-    guests: Arc<Guests>,
-    address: IpAddr,
-}
-
-impl Guests {
-    /// `None` where the address has so many connections already.
-    fn admit(guests: &Arc<Self>, address: IpAddr, most: usize) -> Option<Guest> {
-        let mut counts = guests.lock();
-        let count = counts.entry(address).or_default();
-        if *count >= most {
-            return None;
-        }
-        *count += 1;
-        drop(counts);
-        Some(Guest {
-            guests: Arc::clone(guests),
-            address,
-        })
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<IpAddr, usize>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Drop for Guest {
-    fn drop(&mut self) {
-        if let Entry::Occupied(mut count) = self.guests.lock().entry(self.address) {
-            *count.get_mut() -= 1;
-            if *count.get() == 0 {
-                count.remove();
-            }
-        }
-    }
-}
-
 async fn accept(
     listener: TcpListener,
     router: Router,
@@ -198,24 +151,19 @@ async fn accept(
     connections: &Arc<Semaphore>,
     shutdown: &Shutdown,
 ) {
-    let guests = Arc::new(Guests::default());
     loop {
         // Without a permit the next client waits in the system's queue.
         let Ok(permit) = connections.clone().acquire_owned().await else {
             return;
         };
-        let Ok((socket, peer)) = listener.accept().await else {
+        let Ok((socket, _)) = listener.accept().await else {
             sleep(PAUSE).await;
-            continue;
-        };
-        let address = peer.ip().to_canonical();
-        let Some(guest) = Guests::admit(&guests, address, limits.per_address) else {
             continue;
         };
         let connection = converse(socket, router.clone(), limits, shutdown.clone());
         tokio::spawn(async move {
             connection.await;
-            drop((guest, permit));
+            drop(permit);
         });
     }
 }
@@ -253,25 +201,5 @@ async fn converse(socket: TcpStream, router: Router, limits: ConnectionLimits, s
     {
         connection.as_mut().graceful_shutdown();
         let _ = connection.await;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_address_has_so_many_connections_and_no_other_address_fewer_for_it() {
-        let guests = Arc::new(Guests::default());
-        let admit = |address: &str| Guests::admit(&guests, address.parse().unwrap(), 2);
-        let first = admit("192.0.2.7");
-        let second = admit("192.0.2.7");
-        assert!(first.is_some() && second.is_some());
-        assert!(admit("192.0.2.7").is_none());
-        assert!(admit("192.0.2.8").is_some());
-        drop(second);
-        assert!(admit("192.0.2.7").is_some());
-        drop(first);
-        assert!(guests.lock().is_empty());
     }
 }
