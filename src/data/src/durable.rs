@@ -152,11 +152,6 @@ impl CreatedFolder {
         fs::create_dir_all(path)?;
         Ok(made)
     }
-
-    /// Whether the folder was not there.
-    pub fn is_new(&self) -> bool {
-        !self.made.is_empty()
-    }
 }
 
 impl Drop for CreatedFolder {

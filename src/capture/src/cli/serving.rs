@@ -5,26 +5,24 @@ use std::sync::Arc;
 
 use relit_capture::capture::{CaptureError, Settings};
 use relit_capture::command::Rig;
-use relit_capture::daemon::{Daemon, forget_root};
+use relit_capture::daemon::Daemon;
 use relit_capture::processing::{Processing, ProcessingOptions};
 use relit_capture::serve::{Announcement, ServeOptions, Shutdown, Token, check_address, serve};
 use sd_notify::NotifyState;
 
 use super::arguments::ServeArguments;
 use super::environment::{at_end, notify_service, programs};
+use super::recording::make_root;
 use relit_console::{Console, Event, Outcome};
-use relit_data::durable::CreatedFolder;
 
 pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Box<dyn Error>> {
     let settings: Settings = asked.rig.into();
-    let root = &settings.root.clone();
     let address = asked.listen.socket();
     let token = asked.token_file.as_deref().map(Token::from_file_or_new);
     let token = token.transpose()?;
     // An address that is taken is known before anything is made or moved.
     check_address(address)?;
-    let made = CreatedFolder::make(root)
-        .map_err(CaptureError::system(root.display().to_string(), "made"))?;
+    let made = make_root(&settings)?;
     let shutdown = Shutdown::new();
     let ending = shutdown.clone();
     let end = move || {
@@ -32,12 +30,7 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
         ending.cancel();
     };
     at_end(end).map_err(CaptureError::system("the signals", "listened to"))?;
-    let rig = Daemon::start(settings).inspect_err(|_| {
-        if made.is_new() {
-            forget_root(root);
-        }
-    })?;
-    let rig = Arc::new(rig);
+    let rig = Arc::new(Daemon::start(settings)?);
     let processing = ProcessingOptions {
         datasets: asked.datasets,
         programs: Box::new(programs),

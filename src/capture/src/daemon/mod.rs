@@ -7,10 +7,9 @@
 
 mod dispatcher;
 mod idle;
-mod root_lock;
 mod worker;
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,10 +21,12 @@ use crate::preview::Preview;
 use crate::state::{Monitor, RigState};
 use dispatcher::Dispatcher;
 use relit_data::clock::{Clock, JoinHandle};
+use relit_turntable::holder;
 use relit_turntable::simulator::SimulatedTable;
-pub use root_lock::forget_root;
 use worker::Worker;
 
+/// The file in a folder of sessions that its daemon keeps locked.
+const LOCK_FILE: &str = ".relit-capture.lock";
 /// Farthest that a table is turned by one command, degrees.
 const FARTHEST_JOG: f64 = 800.0;
 
@@ -47,10 +48,10 @@ impl Daemon {
     /// [`CaptureError::InUse`] if another daemon has it, [`CaptureError::Refused`] for speeds that do not fit, or what
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
-        let lock = root_lock::lock(&settings.root)?;
         let root = settings.root.clone();
         let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;
+        let lock = lock(&root)?;
         let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
         let show = |state: &mut RigState| state.settings = shown;
         dispatcher.monitor().update(show);
@@ -120,6 +121,24 @@ impl Rig for Daemon {
 impl Drop for Daemon {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+/// Takes a folder of sessions, until the file is closed or the process dies.
+fn lock(root: &Path) -> Result<File, CaptureError> {
+    let path = root.join(LOCK_FILE);
+    let failed = |doing| CaptureError::system(path.display().to_string(), doing);
+    let file = File::create(&path).map_err(failed("opened"))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => {
+            drop(file);
+            Err(CaptureError::InUse {
+                root: root.to_owned(),
+                pid: holder(&path),
+            })
+        }
+        Err(TryLockError::Error(error)) => Err(failed("locked")(error)),
     }
 }
 
