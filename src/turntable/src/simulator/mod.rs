@@ -34,6 +34,7 @@ mod chip;
 mod faults;
 mod ground_truth;
 mod model;
+mod open_counter;
 mod options;
 mod serial_line;
 mod simulated_table;
@@ -139,7 +140,7 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
     while !stop.load(Ordering::Relaxed) {
         let now_us = clock.now_us();
         let mut model = table.model();
-        if terminal.is_opened() {
+        for _ in 0..terminal.opened() {
             model.open(now_us);
         }
         let capacity = model.capacity().min(MAX_CHUNK);

@@ -10,14 +10,15 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::SimulatorError;
+use super::open_counter::OpenCounter;
 
 /// The chip's end of the serial line.
 pub(super) struct Terminal {
     line: OwnedFd,
+    openings: OpenCounter,
     path: PathBuf,
-    /// No process has the port open, or had when it was last looked at.
+    /// No process has the port open.
     closed: bool,
-    was_closed: bool,
 }
 
 impl Terminal {
@@ -46,11 +47,12 @@ impl Terminal {
         modes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
         drop(port);
+        let openings = OpenCounter::watch(&path).map_err(failed("watch"))?;
         Ok(Terminal {
             line,
+            openings,
             path,
             closed: true,
-            was_closed: true,
         })
     }
 
@@ -59,10 +61,9 @@ impl Terminal {
         &self.path
     }
 
-    /// Whether the port was opened since the last call: an Arduino's chip restarts then. One that is closed and opened
-    /// between two calls is missed.
-    pub(super) fn is_opened(&mut self) -> bool {
-        std::mem::replace(&mut self.was_closed, self.closed) && !self.closed
+    /// How many times the port was opened since the last call.
+    pub(super) fn opened(&mut self) -> u64 {
+        self.openings.count(self.closed)
     }
 
     /// Reads what the host has written, up to the size of the buffer.
