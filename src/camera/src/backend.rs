@@ -14,6 +14,15 @@ pub trait Camera: Send {
     /// The camera's description when it was opened.
     fn info(&self) -> &DeviceInfo;
 
+    /// Takes the camera for this process until it is closed; others may look at it, and not claim it. Of cameras that
+    /// any number of programs can have, nothing is taken.
+    ///
+    /// # Errors
+    /// [`CameraError::InUse`].
+    fn claim(&mut self) -> Result<(), CameraError> {
+        Ok(())
+    }
+
     /// The modes it offers, in formats that can be recorded.
     ///
     /// # Errors

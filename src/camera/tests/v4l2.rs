@@ -380,9 +380,17 @@ fn dropped_buffers_are_gaps_in_the_counter() {
 fn a_second_program_is_refused_and_the_first_goes_on() {
     let mut first = vivid();
     start(&mut *first, mode(b"YUYV", 320, 180, 30));
-    let refused = open(VIVID).err().unwrap();
-    println!("{refused}");
-    assert!(matches!(refused, CameraError::InUse { .. }), "{refused}");
+    first.claim().unwrap();
+    let mut second = open(VIVID).unwrap();
+    let refused = [
+        second.claim(),
+        second.start(&mode(b"YUYV", 640, 480, 25)).map(drop),
+    ];
+    for refused in refused.map(Result::unwrap_err) {
+        println!("{refused}");
+        assert!(matches!(refused, CameraError::InUse { .. }), "{refused}");
+    }
+    drop(second);
     for frame in frames(&mut *first, 10) {
         assert_eq!((frame.fault(), frame.width), (None, 320));
     }

@@ -26,7 +26,6 @@ pub(super) struct V4l2Camera {
 impl V4l2Camera {
     pub(super) fn open(path: &Path) -> Result<Self, CameraError> {
         let (device, info) = Device::open(path)?;
-        device.claim()?;
         Ok(Self {
             device,
             info,
@@ -38,6 +37,10 @@ impl V4l2Camera {
 impl Camera for V4l2Camera {
     fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    fn claim(&mut self) -> Result<(), CameraError> {
+        self.device.claim()
     }
 
     fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {

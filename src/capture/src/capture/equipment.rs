@@ -114,7 +114,11 @@ impl Equipment {
     pub fn open_camera(&mut self) -> Result<&mut dyn Camera, CaptureError> {
         let opened = match self.camera.take() {
             Some(camera) => camera,
-            None => camera::open(&self.settings.camera, self.clock.clone())?,
+            None => {
+                let mut camera = camera::open(&self.settings.camera, self.clock.clone())?;
+                camera.claim()?;
+                camera
+            }
         };
         Ok(self.camera.insert(opened).as_mut())
     }
