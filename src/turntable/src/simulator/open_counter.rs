@@ -15,23 +15,36 @@ mod notified {
     use rustix::fs::inotify;
     use rustix::io::Errno;
 
-    pub(in crate::simulator) struct OpenCounter(OwnedFd);
+    pub(in crate::simulator) struct OpenCounter {
+        watch: OwnedFd,
+        /// How many have the port open: whoever comes second resets nothing.
+        open: usize,
+    }
 
     impl OpenCounter {
         pub(in crate::simulator) fn watch(port: &Path) -> Result<Self, Errno> {
             let flags = inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC;
             let watch = inotify::init(flags)?;
-            inotify::add_watch(&watch, port, inotify::WatchFlags::OPEN)?;
-            Ok(Self(watch))
+            let flags = inotify::WatchFlags::OPEN | inotify::WatchFlags::CLOSE;
+            inotify::add_watch(&watch, port, flags)?;
+            Ok(Self { watch, open: 0 })
         }
 
-        /// Openings since the last call.
-        pub(in crate::simulator) fn count(&mut self, _closed: bool) -> u64 {
+        /// Openings of a closed port since the last call. `closed`: whether it was closed then.
+        pub(in crate::simulator) fn count(&mut self, closed: bool) -> u64 {
+            if closed {
+                self.open = 0;
+            }
             let mut buffer = [MaybeUninit::uninit(); 1024];
-            let mut reader = inotify::Reader::new(&self.0, &mut buffer);
+            let mut reader = inotify::Reader::new(&self.watch, &mut buffer);
             let mut times = 0;
-            while reader.next().is_ok() {
-                times += 1;
+            while let Ok(event) = reader.next() {
+                if event.events().contains(inotify::ReadFlags::OPEN) {
+                    times += u64::from(self.open == 0);
+                    self.open += 1;
+                } else {
+                    self.open = self.open.saturating_sub(1);
+                }
             }
             times
         }
