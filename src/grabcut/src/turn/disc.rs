@@ -38,21 +38,27 @@ impl Disc {
             .filter(is_free)
             .map(|(x, y)| [x as f64 / width as f64, y as f64 / width as f64])
             .collect();
+        let mut best: Option<(f64, Self)> = None;
         for _ in 0..ROUNDS {
-            let disc = Self::through(&points, width as f64)?;
+            let Some(disc) = Self::through(&points, width as f64) else {
+                break;
+            };
             let off = |point: &[f64; 2]| {
                 let rims = disc.rims(point[0]);
                 rims.map_or(f64::INFINITY, |[top, _]| (top - point[1]).abs())
             };
             let mut apart: Vec<f64> = points.iter().map(off).collect();
             apart.sort_by(f64::total_cmp);
-            let median = *apart.get(apart.len() / 2)?;
-            if median < NEAR && disc.is_plausible(&points) {
-                return Some(disc);
+            let Some(&median) = apart.get(apart.len() / 2) else {
+                break;
+            };
+            let is_better = median < best.map_or(NEAR, |(least, _)| least);
+            if is_better && disc.is_plausible(&points) {
+                best = Some((median, disc));
             }
             points.retain(|point| off(point) <= FAR * median);
         }
-        None
+        best.map(|(_, disc)| disc)
     }
 
     /// The height of the disc's upper rim in a column of pixels.

@@ -15,7 +15,7 @@ const REACH: usize = 4;
 /// A mean needs at least so many pixels.
 const MIN_PIXELS: usize = 3;
 /// Series that differ by less than this, as a root of the mean square, say nothing.
-const NOISE: f32 = 0.004;
+const NOISE: f32 = 0.01;
 
 /// The object with its edge where the courses show it.
 pub(crate) fn along_series(series: &PixelSeries, object: &Bitmap) -> Bitmap {

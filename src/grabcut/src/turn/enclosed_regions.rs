@@ -24,6 +24,14 @@ const CLEARLY: f32 = 0.9;
 /// An average brightness L that may be overexposed in places.
 const NEARLY_WHITE: f32 = 95.0;
 
+/// Smaller lost parts are not restored, as a share of the object, and parts that are at most twice so many pixels wide.
+const LEAST_LOST: f64 = 0.002;
+const LOST_WIDTH: usize = 1;
+/// What the table's model and the rows' ends say at least of a lost part of a dark object, as a mean of its pixels.
+const LIKE_LOST: f32 = -2.5;
+/// The outline of a lost part is at least this share as strong as the object's.
+const LOST_OUTLINE: f32 = 0.8;
+
 /// What is not in the object, and enclosed by it but for a narrow neck.
 pub(crate) fn enclosed(object: &Bitmap, width: usize) -> Bitmap {
     let neck = ((width as f64 * NECK).round() as usize).max(1);
@@ -38,6 +46,25 @@ impl TurnField {
             self.is_background(&part(), object) == Some(false)
         };
         object.or(&enclosed(object, self.size.0).parts_where(Connectivity::Four, is_object))
+    }
+
+    /// A dark object with those parts of a cut without the table's model that are hardly like the table, and have an
+    /// outline as strong as the object's: black legs are as dark as the table.
+    pub(crate) fn restored(&self, object: &Bitmap, before: &Bitmap) -> Bitmap {
+        let least = (object.count() as f64 * LEAST_LOST) as u64;
+        let lost = before.minus(object).opened(LOST_WIDTH);
+        object.or(&lost.parts_where(Connectivity::Four, |part, pixels| {
+            part.area >= least && self.is_lost(&pixels(), object)
+        }))
+    }
+
+    fn is_lost(&self, part: &Bitmap, object: &Bitmap) -> bool {
+        let evidence = part.bits().iter().zip(&self.evidence);
+        let evidence = evidence.filter(|(bit, _)| **bit);
+        let evidence = evidence.map(|(_, evidence)| evidence).sum::<f32>() / part.count() as f32;
+        let outline = self.boundary(part, &object.or(part).inverted());
+        evidence >= LIKE_LOST
+            && outline.is_some_and(|outline| outline >= LOST_OUTLINE * self.outline(object))
     }
 
     /// Whether a part inside or beside the object shows the background or the table; none of a part without pixels.

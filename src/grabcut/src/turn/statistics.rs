@@ -112,6 +112,8 @@ pub struct TurnStatistics {
     /// At half the size; `None` if the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
     pub(crate) series: PixelSeries,
+    /// The object as it was cut without the table's model, if it is about as dark as the table.
+    dark_object: Option<Bitmap>,
 }
 
 impl TurnStatistics {
@@ -129,7 +131,9 @@ impl TurnStatistics {
             Some(coarse) => coarse.own_cut().map(|object| object.enlarged(2, fine.size)),
             None => fine.own_cut(),
         };
-        let model = object.and_then(|object| fine.table_model(&series, &object));
+        let model = object.as_ref();
+        let model = model.and_then(|object| fine.table_model(&series, object));
+        let is_dark = model.as_ref().is_some_and(|model| !model.object_is_bright);
         if let Some(model) = &model {
             fine.learn_table(model);
             if let Some(coarse) = &mut coarse {
@@ -142,6 +146,7 @@ impl TurnStatistics {
             fine,
             coarse,
             series,
+            dark_object: object.filter(|_| is_dark),
         }
     }
 
@@ -203,7 +208,7 @@ pub(crate) struct TurnField {
     /// Pixels that are background by the ends of their rows.
     pub(crate) backdrop: Bitmap,
     pub(crate) table: Turntable,
-    evidence: Vec<f32>,
+    pub(crate) evidence: Vec<f32>,
     pub(crate) temporal_evidence: TemporalEvidence,
     /// What the table's model takes for the table; none without one.
     pub(crate) seen_table: Option<SeenTable>,
@@ -507,6 +512,11 @@ pub(crate) fn segment(
     let at_fine = levels.iter().position(|level| level.size() == fine.size);
     let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
     let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share)?;
+    if let Some(before) = &turn.dark_object {
+        change(&mut labels, fine.size, |object| {
+            fine.restored(object, before)
+        });
+    }
     change(&mut labels, fine.size, |object| {
         without_rim(object, &fine.table, fine.size)
     });

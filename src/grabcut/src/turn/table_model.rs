@@ -72,6 +72,10 @@ const BINS: usize = 36;
 const MIN_SPREAD: f32 = 0.2;
 /// Openings are in shade, and further from the table than it is on average: the spread is so many times as wide there.
 const SHADED: f32 = 2.0;
+/// An object is bright if at least half of it has a measure of its darkness that is smaller than the table's by this.
+const FAR_BRIGHTER: f32 = 3.0;
+/// Of a bright object one of so many of the pixels that are as dark as the table counts as its own.
+const DOUBTED: usize = 4;
 /// At most this share of what looks like the object is table.
 const MAX_INCLUDED: f32 = 0.2;
 /// The object has each distance with at least this density, and so has the table, which an object lights from nearby.
@@ -112,6 +116,8 @@ pub(crate) struct TableModel {
     shaded: Bitmap,
     /// The pixels that are about as bright as the unshaded table in the frames in which they are brightest.
     as_bright: Bitmap,
+    /// Whether most of the object that was found is far brighter than the table.
+    pub(crate) object_is_bright: bool,
     size: (usize, usize),
 }
 
@@ -137,10 +143,16 @@ impl TableModel {
         let darker: Vec<f32> = darker
             .map(|(at, by)| BRIGHTNESS * (trend.at(at) - by))
             .collect();
-        let core = seen.object.eroded(2);
-        let by_course = log_ratios(&logs, &taken, &core)?;
-        let by_brightness = log_ratios(&darker, &taken, &core)?;
         let of_table = TableDensity::learn(taken.iter().map(|&at| darker[at]))?;
+        let core = seen.object.eroded(2);
+        let far_brighter = core.map(|at, bit| bit && darker[at] < of_table.middle - FAR_BRIGHTER);
+        let object_is_bright = 2 * far_brighter.count() >= core.count();
+        // What is dark in a bright object may be table in its shade, which the first cut took for a part of it.
+        let least = of_table.middle - of_table.spread;
+        let doubted = |at: usize| object_is_bright && darker[at] > least;
+        let core = core.map(|at, bit| bit && (!doubted(at) || is_one_of(at, core.width())));
+        let course = LogRatios::learn(&logs, &taken, &core)?;
+        let by_brightness = LogRatios::learn(&darker, &taken, &core)?.ratios;
         let off: Vec<f32> = darker
             .iter()
             .map(|darker| (darker - of_table.middle) / of_table.spread)
@@ -148,33 +160,45 @@ impl TableModel {
         let as_bright = far.map(|at, _| off[at].abs() <= AS_BRIGHT);
         let as_unshaded = far.map(|at, _| off[at].abs() <= SAME && by_brightness[at] <= NOT_OBJECT);
         let shaded = shaded(&off, &as_unshaded, seen.object);
-        let both = by_course.iter().zip(&by_brightness);
+        let both = course.ratios.iter().zip(&by_brightness);
         let ratio: Vec<f32> = both
             .map(|(course, brightness)| course + brightness.max(-AS_DARK))
             .collect();
-        // What is not table on the disc is object; elsewhere it may be the room.
-        let alike = far.map(|at, far| far && ratio[at] < 0.0);
-        let seen_table = alike
-            .eroded(1)
-            .parts_where(Connectivity::Four, |part, pixels| {
-                part.area >= MIN_SAMPLES as u64 && pixels().and(&table).count() > 0
-            });
-        let on_disc = on_disc(&seen_table, &far);
-        let ratio = ratio.iter().enumerate().map(|(at, &ratio)| {
-            match (shaded.bits()[at], on_disc.bits()[at]) {
-                (true, _) => -STRENGTH,
-                (_, true) => ratio.clamp(-STRENGTH, STRENGTH),
-                (_, false) => ratio.clamp(-STRENGTH, 0.0),
-            }
+        // What is not table on the disc is object, and the table is never above its rim; below it may be the room, which
+        // may be as unlike the table as a black object.
+        let seen_table = |is_like: &dyn Fn(usize) -> bool| {
+            let alike = far.map(|at, far| far && ratio[at] < 0.0 && is_like(at));
+            alike
+                .eroded(1)
+                .parts_where(Connectivity::Four, |part, pixels| {
+                    part.area >= MIN_SAMPLES as u64 && pixels().and(&table).count() > 0
+                })
+        };
+        let size = series.size();
+        let fit = |seen: Bitmap| Disc::fit(&seen, &far, size).map(|disc| (seen, disc));
+        let rim = fit(seen_table(&|at| course.of_table.has(logs[at])))
+            .or_else(|| fit(seen_table(&|_| true)));
+        let disc = rim.as_ref().map(|(_, disc)| *disc);
+        let on_disc = match &rim {
+            Some((seen, disc)) => on_disc(seen, *disc),
+            None => far.minus(&far),
+        };
+        let above = above_rim(&far, disc);
+        let ratio = ratio.iter().enumerate().map(|(at, &ratio)| match () {
+            () if shaded.bits()[at] => -STRENGTH,
+            () if on_disc.bits()[at] => ratio.clamp(-STRENGTH, STRENGTH),
+            () if above.bits()[at] => 0.0,
+            () => ratio.clamp(-STRENGTH, 0.0),
         });
         Some(Self {
             ratio: ratio.collect(),
             as_unshaded,
             shaded,
-            by_course,
+            by_course: course.ratios,
             on_disc,
             as_bright,
-            size: series.size(),
+            object_is_bright,
+            size,
         })
     }
 
@@ -204,6 +228,7 @@ impl TableModel {
             as_bright: all(&self.as_bright),
             as_unshaded: all(&self.as_unshaded),
             shaded: all(&self.shaded),
+            object_is_bright: self.object_is_bright,
             size: half,
         }
     }
@@ -303,29 +328,49 @@ fn thinned(samples: &Bitmap) -> Vec<usize> {
 }
 
 /// The pixels between the table's upper rim and the lowest of it in their column: nothing but the object can hide the
-/// table there. None without a rim that is seen well.
-fn on_disc(table: &Bitmap, far: &Bitmap) -> Bitmap {
+/// table there.
+fn on_disc(table: &Bitmap, disc: Disc) -> Bitmap {
     let width = table.width();
-    let size = (width, table.bits().len() / width.max(1));
-    let disc = Disc::fit(table, far, size);
     let mut lowest = vec![0; width];
     for (at, _) in table.bits().iter().enumerate().filter(|(_, bit)| **bit) {
         lowest[at % width] = at / width;
     }
     table.map(|at, _| {
         let (x, y) = (at % width, at / width);
-        let top = disc.and_then(|disc| disc.top(x));
+        let top = disc.top(x);
         y <= lowest[x] && top.is_some_and(|top| y as f64 >= top + RIM * width as f64)
     })
 }
 
+/// The pixels of an image like `like` that are above the table's upper rim; none without a rim that is seen well.
+fn above_rim(like: &Bitmap, disc: Option<Disc>) -> Bitmap {
+    let width = like.width();
+    like.map(|at, _| {
+        let top = disc.and_then(|disc| disc.top(at % width));
+        top.is_some_and(|top| ((at / width) as f64) < top - RIM * width as f64)
+    })
+}
+
+/// Whether a pixel is one of so many that are doubted, spread evenly.
+fn is_one_of(at: usize, width: usize) -> bool {
+    (at / width + at % width).is_multiple_of(DOUBTED)
+}
+
 /// How much more likely each pixel is object than table by one measure, as a logarithm.
-fn log_ratios(values: &[f32], table: &[usize], object: &Bitmap) -> Option<Vec<f32>> {
-    let of_table = TableDensity::learn(table.iter().map(|&at| values[at]))?;
-    let core = object.bits().iter().zip(values).filter(|(bit, _)| **bit);
-    let of_object = ObjectDensity::learn(core.map(|(_, &value)| value), &of_table);
-    let ratio = |&value: &f32| (of_object.at(value) / of_table.at(value)).ln();
-    Some(values.iter().map(ratio).collect())
+struct LogRatios {
+    of_table: TableDensity,
+    ratios: Vec<f32>,
+}
+
+impl LogRatios {
+    fn learn(values: &[f32], table: &[usize], object: &Bitmap) -> Option<Self> {
+        let of_table = TableDensity::learn(table.iter().map(|&at| values[at]))?;
+        let core = object.bits().iter().zip(values).filter(|(bit, _)| **bit);
+        let of_object = ObjectDensity::learn(core.map(|(_, &value)| value), &of_table);
+        let ratio = |&value: &f32| (of_object.at(value) / of_table.at(value)).ln();
+        let ratios = values.iter().map(ratio).collect();
+        Some(Self { of_table, ratios })
+    }
 }
 
 /// The parts of an object that are the table in a shade that lasts for most of the turn, as under a sun: even there,
@@ -467,6 +512,11 @@ impl TableDensity {
         let offset = (log - self.middle) / (wide * self.spread);
         let both = self.spread * (1.0 + SHADED) / 2.0;
         (-0.5 * offset * offset).exp() / (both * std::f32::consts::TAU.sqrt()) + TABLE_FLOOR
+    }
+
+    /// Whether the table has such values, and not only what lies on it.
+    fn has(&self, log: f32) -> bool {
+        self.at(log) >= 2.0 * TABLE_FLOOR
     }
 }
 
