@@ -1,6 +1,7 @@
 //! The extraction of one recording, from its files to its entry in the data set.
 
 use std::collections::HashMap;
+use std::mem::take;
 use std::path::Path;
 
 use image::RgbImage;
@@ -167,8 +168,9 @@ impl Job {
             }
             let mut all_known = false;
             while !assignments.is_empty() {
-                let newly_lost = stage.run(&assignments, pool, |frame| {
-                    let assigned = assignments.get(&frame.number).into_iter().flatten();
+                let newly_lost = stage.run(&assignments, pool, |mut frame| {
+                    let assigned = assignments.get(&frame.number);
+                    let assigned = assigned.map(Vec::as_slice).unwrap_or_default();
                     if let Some(alignment) = &frame.alignment {
                         course.add(frame.number, alignment);
                         if alignment.shift.is_none() && !all_known {
@@ -178,12 +180,16 @@ impl Job {
                         }
                         stability.add(frame.number, alignment, frame.interpolated);
                     }
-                    for &sample in assigned {
+                    for (at, &sample) in assigned.iter().enumerate() {
                         let record = self.record(&stage, &plan, &frame, sample, options);
                         if is_thumbnail(record.index, samples) {
                             thumbnails.push((record.index, small(&frame.image)));
                         }
-                        let (image, png) = (frame.image.clone(), frame.png.clone());
+                        let (image, png) = if at + 1 == assigned.len() {
+                            (take(&mut frame.image), take(&mut frame.png))
+                        } else {
+                            (frame.image.clone(), frame.png.clone())
+                        };
                         writer.push(Sample { record, image, png })?;
                         observer.advanced();
                     }
@@ -194,7 +200,7 @@ impl Job {
                 lost.extend(newly_lost);
                 if assignments.is_empty() && !all_known {
                     all_known = true;
-                    assignments = std::mem::take(&mut waiting);
+                    assignments = take(&mut waiting);
                     if let Some(align) = &mut stage.align {
                         align.interpolated = course.fill(assignments.keys().copied());
                     }
