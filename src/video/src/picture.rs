@@ -159,8 +159,8 @@ impl Picture {
     }
 }
 
-/// Rows that are converted at a time: few enough for the processor's cache.
-const STRIP: usize = 16;
+/// Rows that are converted at a time: few enough for the processor's nearest cache.
+const STRIP: usize = 4;
 
 /// RGBA of part of a planar YUV picture, from a pixel on that a chroma sample begins with.
 fn planes_to_rgba(
