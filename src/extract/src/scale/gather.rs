@@ -214,8 +214,12 @@ impl WithSimd for Run<'_, '_> {
             match gather.part {
                 None => {
                     for columns in gather.source.runs.get(at).into_iter().flatten() {
-                        light_of(row, columns, &mut buffers.light);
-                        gather.add(open.clone(), at, columns, planes, buffers);
+                        if open.len() == 2 {
+                            gather.add_light(open.start, at, (row, columns), buffers);
+                        } else {
+                            light_of(row, columns, &mut buffers.light);
+                            gather.add(open.clone(), at, columns, planes, buffers);
+                        }
                     }
                 }
                 Some(part) => {
@@ -249,13 +253,48 @@ impl Gather<'_> {
     ) {
         let ring = sums.len();
         for output in outputs {
-            let (start, weights) = self.down.window(output);
-            let weight = weights[at - start];
+            let weight = self.weight(output, at);
             let sums = &mut sums[output % ring];
             for (sum, light) in sums.iter_mut().zip(&*light).take(planes) {
                 add_scaled(&mut sum[columns.clone()], &light[columns.clone()], weight);
             }
         }
+    }
+
+    /// Adds the light of row `at` to two output rows from `output` on, without keeping it: most rows belong to two.
+    #[inline(always)]
+    fn add_light(
+        &self,
+        output: usize,
+        at: usize,
+        (row, columns): (&[u8], &Range<usize>),
+        ScaleBuffers { sums, .. }: &mut ScaleBuffers,
+    ) {
+        let outputs = [output, output + 1];
+        let weights = outputs.map(|output| self.weight(output, at));
+        let places = outputs.map(|output| output % sums.len());
+        let Ok([first, second]) = sums.get_disjoint_mut(places) else {
+            return;
+        };
+        let pixels = &row[4 * columns.start..4 * columns.end];
+        // One channel at a time: the processor has too few registers for three.
+        for (channel, (first, second)) in (0..3).zip(first.iter_mut().zip(second)) {
+            let sums = first[columns.clone()]
+                .iter_mut()
+                .zip(&mut second[columns.clone()]);
+            for (pixel, (first, second)) in pixels.chunks_exact(4).zip(sums) {
+                let light = light_at(pixel, channel);
+                *first += weights[0] * light;
+                *second += weights[1] * light;
+            }
+        }
+    }
+
+    /// The weight of row `at` in an output row to which it belongs.
+    #[inline(always)]
+    fn weight(&self, output: usize, at: usize) -> f32 {
+        let (start, weights) = self.down.window(output);
+        weights[at - start]
     }
 
     /// Filters an output row across.
@@ -334,14 +373,20 @@ impl ScaleBuffers {
 #[inline(always)]
 fn light_of(row: &[u8], columns: &Range<usize>, light: &mut [Vec<f32>; PLANES]) {
     let pixels = &row[4 * columns.start..4 * columns.end];
-    // One channel at a time: the processor has too few registers for three.
+    // As in `add_light`.
     for (channel, plane) in (0..3).zip(light) {
         let plane = &mut plane[columns.clone()];
         for (pixel, light) in pixels.chunks_exact(4).zip(plane) {
-            let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
-            *light = linear((all >> (8 * channel)) & 255);
+            *light = light_at(pixel, channel);
         }
     }
+}
+
+/// The light of a pixel's channel.
+#[inline(always)]
+fn light_at(pixel: &[u8], channel: u32) -> f32 {
+    let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+    linear((all >> (8 * channel)) & 255)
 }
 
 /// Multiplies the light by the share of the mask, moved by part of a pixel, in each pixel of row `y`; notes
@@ -410,21 +455,22 @@ fn side_by_side(planes: &[Vec<f32>; PLANES], columns: Range<usize>, line: &mut [
 /// The sum of pixels times their weights, whose number is a multiple of four.
 #[inline(always)]
 fn weighed_sum(weights: &[f32], pixels: &[[f32; PLANES]]) -> [f32; PLANES] {
-    let mut lanes = [[0.0; PLANES]; 4];
+    // In one array, so that it becomes one vector.
+    let mut lanes = [0.0; 4 * PLANES];
     let fours = weights
         .as_chunks::<4>()
         .0
         .iter()
-        .zip(pixels.as_chunks::<4>().0);
+        .zip(pixels.as_flattened().as_chunks::<{ 4 * PLANES }>().0);
     for (weights, pixels) in fours {
-        for ((lane, weight), pixel) in lanes.iter_mut().zip(weights).zip(pixels) {
-            for (sum, value) in lane.iter_mut().zip(pixel) {
-                *sum += weight * value;
-            }
+        for (at, (sum, value)) in lanes.iter_mut().zip(pixels).enumerate() {
+            *sum += weights[at / PLANES] * value;
         }
     }
-    let [a, b, c, d] = lanes;
-    std::array::from_fn(|plane| (a[plane] + c[plane]) + (b[plane] + d[plane]))
+    let lane = |at: usize, plane: usize| lanes[PLANES * at + plane];
+    std::array::from_fn(|plane| {
+        (lane(0, plane) + lane(2, plane)) + (lane(1, plane) + lane(3, plane))
+    })
 }
 
 #[cfg(test)]
