@@ -139,29 +139,15 @@ impl Template {
             pixels().map(|pixel| f64::from(of(pixel))).sum()
         };
         let centre = (sum(|p| p.x) / count, sum(|p| p.y) / count);
-        let mut normal = [[0.0; 4]; 4];
-        let mut right = [0.0; 4];
-        let mut distance = 0.0;
-        let sampler = Sampler::new(frame, shift);
-        for pixel in pixels() {
-            let Some(found) = sampler.at(pixel) else {
-                continue;
-            };
-            let (x, y) = (f64::from(pixel.x) - centre.0, f64::from(pixel.y) - centre.1);
-            distance += (x * x + y * y).sqrt();
-            let (weight, residual) = weighed(pixel, found, FAR_OUTLIER);
-            let weight = f64::from(weight);
-            let [xx, xy, yy] = pixel.change.map(f64::from);
-            for (residual, [jx, jy]) in residual.into_iter().zip([[xx, xy], [xy, yy]]) {
-                let row = [jx, jy, x * jy - y * jx, x * jx + y * jy];
-                for (i, a) in row.into_iter().enumerate() {
-                    right[i] += weight * a * f64::from(residual);
-                    for (j, b) in row.into_iter().enumerate() {
-                        normal[i][j] += weight * a * b;
-                    }
-                }
-            }
-        }
+        let SimilaritySums {
+            normal,
+            right,
+            distance,
+        } = Arch::new().dispatch(SummingSimilarity {
+            pixels: pixels(),
+            sampler: Sampler::new(frame, shift),
+            centre,
+        });
         let [_, _, turned, grown] = solved(normal, right)?;
         // The residual is that of the template's place minus the frame's.
         Some(Similarity {
@@ -210,6 +196,51 @@ impl WithSimd for Summing<'_> {
             *xx += right * right;
             *xy += right * down;
             *yy += down * down;
+        }
+        sums
+    }
+}
+
+/// The normal equations of shift, rotation and growth, and the sum of the distances from the centre.
+#[derive(Default)]
+struct SimilaritySums {
+    normal: [[f64; 4]; 4],
+    right: [f64; 4],
+    distance: f64,
+}
+
+/// As [`Summing`], for a rotation and a growth about a centre.
+struct SummingSimilarity<'a, I> {
+    pixels: I,
+    sampler: Sampler<'a>,
+    centre: (f64, f64),
+}
+
+impl<'a, I: Iterator<Item = &'a TemplatePixel>> WithSimd for SummingSimilarity<'_, I> {
+    type Output = SimilaritySums;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> SimilaritySums {
+        let mut sums = SimilaritySums::default();
+        for pixel in self.pixels {
+            let Some(found) = self.sampler.at(pixel) else {
+                continue;
+            };
+            let x = f64::from(pixel.x) - self.centre.0;
+            let y = f64::from(pixel.y) - self.centre.1;
+            sums.distance += (x * x + y * y).sqrt();
+            let (weight, residual) = weighed(pixel, found, FAR_OUTLIER);
+            let weight = f64::from(weight);
+            let [xx, xy, yy] = pixel.change.map(f64::from);
+            for (residual, [jx, jy]) in residual.into_iter().zip([[xx, xy], [xy, yy]]) {
+                let row = [jx, jy, x * jy - y * jx, x * jx + y * jy];
+                for ((a, right), normal) in row.iter().zip(&mut sums.right).zip(&mut sums.normal) {
+                    *right += weight * a * f64::from(residual);
+                    for (b, normal) in row.iter().zip(normal) {
+                        *normal += weight * a * b;
+                    }
+                }
+            }
         }
         sums
     }
