@@ -61,6 +61,5 @@ pub use sequence::{FrameTruth, SequenceDescription, SequenceRecipe, write_sequen
 pub use shape::ShapeKind;
 pub use transfer::{
     CURVE_TERMS, CurveTerms, EnvironmentLights, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan,
-    PhotoPrint, PhotoView, PhotoViewRecipe, TurnMaterial, TurnPlan, TurnView, TurnViewRecipe,
-    ViewLamp,
+    PhotoPrint, PhotoView, TurnMaterial, TurnPlan, TurnView, ViewLamp, ViewRecipe,
 };

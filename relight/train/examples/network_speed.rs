@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use relight_photo::nets::{INPUTS, Inference, Weights, decomposer};
-use relight_synth::{Folders, Library, PhotoViewRecipe};
+use relight_synth::{Folders, Library, PhotoView, ViewRecipe};
 use relight_train::{
     Adam, ComputePrecision, DataSettings, Model, Photographs, Resources, RunSettings, keep_memory,
 };
@@ -59,17 +59,15 @@ fn photographs(side: usize, batch: usize) -> Result<Photographs, Box<dyn Error>>
 /// One view more with each call.
 fn cast(side: usize) -> Result<impl FnMut() -> usize, Box<dyn Error>> {
     let library = Library::read(&Folders::default())?;
-    let recipe = PhotoViewRecipe {
+    let recipe = ViewRecipe {
         seed: 1,
         size: u32::try_from(side)?,
         rays: DataSettings::default().rays,
     };
     let mut next = 0..;
     Ok(move || {
-        recipe
-            .cast(&library, next.next().unwrap_or_default())
-            .base
-            .len()
+        let number = next.next().unwrap_or_default();
+        PhotoView::cast(&recipe, &library, number).base.len()
     })
 }
 

@@ -21,8 +21,8 @@ use relight_train::{
     Adam, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings, DecomposeTask, MetricsLog,
     Model, PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings, PaperTask, Photographs,
     PredictedTensors, ProcessGroup, Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE,
-    TrainError, TrainObserver, Trainable, TrainingTask, TransferSettings, TurnNetworkSettings,
-    TurnNetworkTask, Validation, read_settings,
+    TrainError, TrainObserver, Trainable, TrainingTask, TurnNetworkSettings, TurnNetworkTask,
+    Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -227,15 +227,15 @@ fn a_run_that_was_stopped_goes_on_to_the_same_losses_and_weights() {
 fn turn_task(steps: u64, workers: usize) -> (TurnNetworkTask, RunSettings) {
     let settings = TurnNetworkSettings {
         run: small_run(steps),
-        data: TransferSettings {
+        data: DataSettings {
             size: 32,
             views: 5,
-            first_views: 4,
+            first_views: Some(4),
             new_views: 1,
             rays: 16,
             variants: 1,
             validation: 2,
-            ..TransferSettings::default()
+            ..DataSettings::default()
         },
     };
     let run = settings.run.clone();
@@ -674,14 +674,14 @@ fn a_run_that_is_asked_to_stop_while_its_first_views_are_cast_stops_then() {
 fn a_run_that_is_asked_to_stop_while_its_validation_is_cast_keeps_a_checkpoint() {
     let settings = TurnNetworkSettings {
         run: small_run(4),
-        data: TransferSettings {
+        data: DataSettings {
             size: 32,
             views: 4,
-            first_views: 4,
+            first_views: Some(4),
             rays: 4096,
             variants: 1,
             validation: 500,
-            ..TransferSettings::default()
+            ..DataSettings::default()
         },
     };
     let (resources, folder) = (resources(), tempfile::tempdir().unwrap());

@@ -221,7 +221,7 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
 }
 
 impl RunArguments {
-    fn settings<S: Default + DeserializeOwned>(&self) -> Result<S, TrainError> {
+    fn settings<S: Default + Serialize + DeserializeOwned>(&self) -> Result<S, TrainError> {
         let file = self.settings.as_deref();
         file.map_or_else(|| Ok(S::default()), read_settings)
     }

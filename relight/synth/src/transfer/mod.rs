@@ -38,9 +38,20 @@ use relight_core::render::cosine_lobe;
 
 pub use environment_lights::EnvironmentLights;
 pub use photo_plan::{PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint};
-pub use photo_view::{PhotoView, PhotoViewRecipe, ViewLamp};
+pub use photo_view::{PhotoView, ViewLamp};
 pub use turn_plan::{CURVE_TERMS, CurveTerms, TurnMaterial, TurnPlan};
-pub use turn_view::{TurnView, TurnViewRecipe};
+pub use turn_view::TurnView;
+
+/// How views are drawn and cast. The same recipe and library give the same views.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ViewRecipe {
+    /// The seed of all draws.
+    pub seed: u64,
+    /// Width and height, pixels.
+    pub size: u32,
+    /// Rays a pixel, all around; half of them leave the surface.
+    pub rays: u32,
+}
 
 /// The order of the light: lamps are blurred by it, and gloss as smooth as varnish.
 pub(crate) const TRANSFER_ORDER: Order = Order::LAMP;

@@ -7,8 +7,8 @@ use glam::{Mat3, Vec3};
 use half::f16;
 use relight_core::light::Order;
 
-use super::BOUNCE_COEFFICIENTS;
 use super::cast::cast_pixels;
+use super::{BOUNCE_COEFFICIENTS, ViewRecipe};
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
 use crate::lighting::SyntheticLamp;
@@ -27,17 +27,6 @@ const MESHES: f32 = 0.6;
 const ELEVATIONS: std::ops::Range<f32> = 0.0..50.0;
 /// A lamp far away is this far: all rays from it are parallel.
 const FAR: f32 = 1e3;
-
-/// How views for photographs are drawn and cast. The same recipe and library give the same views.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PhotoViewRecipe {
-    /// The seed of all draws.
-    pub seed: u64,
-    /// Width and height, pixels.
-    pub size: u32,
-    /// Rays a pixel, all around; half of them leave the surface.
-    pub rays: u32,
-}
 
 /// A lamp whose visibility is cast with a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,13 +80,13 @@ impl PhotoView {
     pub const BASE: usize = Self::BOUNCED + BOUNCE_COEFFICIENTS;
 }
 
-impl PhotoViewRecipe {
+impl PhotoView {
     /// Casts the view of a number.
-    pub fn cast(&self, library: &Library, number: u64) -> PhotoView {
-        let mut random = Random::new(stream(stream(self.seed, 33), number));
+    pub fn cast(view: &ViewRecipe, library: &Library, number: u64) -> Self {
+        let mut random = Random::new(stream(stream(view.seed, 33), number));
         let recipe = Recipe {
-            seed: self.seed,
-            size: self.size,
+            seed: view.seed,
+            size: view.size,
             ..Recipe::default()
         };
         let (object, mesh) = recipe.object_with(library, number, MESHES);
@@ -108,9 +97,9 @@ impl PhotoViewRecipe {
         let finishes: Vec<Finish> = (0..PhotoView::FINISHES)
             .map(|_| Finish::draw(&mut random, &seen.buffer, library, 0.0, false))
             .collect();
-        PhotoView {
-            size: self.size,
-            base: seen.base(self.rays, random.seed()),
+        Self {
+            size: view.size,
+            base: seen.base(view.rays, random.seed()),
             finishes: finishes
                 .iter()
                 .flat_map(|finish| seen.finish_planes(finish, library))

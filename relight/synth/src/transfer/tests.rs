@@ -346,13 +346,13 @@ fn highlights_of_rendered_frames_are_as_strong_as_the_transfer_says() {
 #[test]
 fn a_turn_is_the_same_for_the_same_seed_and_its_numbers_are_in_range() {
     let library = Library::read(&Folders::default()).unwrap();
-    let recipe = TurnViewRecipe {
+    let recipe = ViewRecipe {
         seed: 3,
         size: 16,
         rays: 32,
     };
-    let view = recipe.cast(&library, 5);
-    assert_eq!(view, recipe.cast(&library, 5));
+    let view = TurnView::cast(&recipe, &library, 5);
+    assert_eq!(view, TurnView::cast(&recipe, &library, 5));
     assert_eq!(view.base.len(), TurnView::BASE * 256);
     let finishes = TurnView::FINISHES * TurnView::FINISH_PLANES;
     assert_eq!(view.finishes.len(), finishes * 256);
@@ -506,13 +506,13 @@ fn panoramas_irradiance(light: &ShLight) -> f32 {
 #[test]
 fn a_photograph_is_the_same_for_the_same_seed_and_its_light_is_room_and_lamps() {
     let library = Library::read(&Folders::default()).unwrap();
-    let recipe = PhotoViewRecipe {
+    let recipe = ViewRecipe {
         seed: 3,
         size: 16,
         rays: 32,
     };
-    let view = recipe.cast(&library, 5);
-    assert_eq!(view, recipe.cast(&library, 5));
+    let view = PhotoView::cast(&recipe, &library, 5);
+    assert_eq!(view, PhotoView::cast(&recipe, &library, 5));
     assert_eq!(view.base.len(), PhotoView::BASE * 256);
     assert_eq!(
         view.finishes.len(),

@@ -7,7 +7,7 @@ use relight_core::light::Order;
 
 use super::cast::{cast_pixels, table_frame};
 use super::photo_view::{ViewGeometry, write};
-use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS, TRANSFER_ORDER};
+use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS, TRANSFER_ORDER, ViewRecipe};
 use crate::library::Library;
 use crate::random::{Random, stream};
 use crate::samples::finish::Finish;
@@ -18,17 +18,6 @@ use crate::sequence::{TablePose, standing_object};
 const ELEVATIONS: Range<f32> = 5.0..40.0;
 /// Part of the objects that are meshes, if there are any.
 const MESHES: f32 = 0.6;
-
-/// How views of turns are drawn and cast. The same recipe and library give the same views.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TurnViewRecipe {
-    /// The seed of all draws.
-    pub seed: u64,
-    /// Width and height, pixels.
-    pub size: u32,
-    /// Rays a pixel, all around; half of them leave the surface.
-    pub rays: u32,
-}
 
 /// A view, cast once. All planes are `size x size`, row by row, and 0 outside the object. Vectors are in the viewer's frame,
 /// harmonics in the table's.
@@ -69,24 +58,24 @@ impl TurnView {
     }
 }
 
-impl TurnViewRecipe {
+impl TurnView {
     /// Casts the view of a number.
-    pub fn cast(&self, library: &Library, number: u64) -> TurnView {
-        let mut random = Random::new(stream(stream(self.seed, 31), number));
+    pub fn cast(view: &ViewRecipe, library: &Library, number: u64) -> Self {
+        let mut random = Random::new(stream(stream(view.seed, 31), number));
         let recipe = Recipe {
             seed: random.seed(),
-            size: self.size,
+            size: view.size,
             ..Recipe::default()
         };
         let (_, mesh) = standing_object(&recipe, library, MESHES, &mut random);
         let stand = TablePose::draw(&mut random, ELEVATIONS);
-        let seen = ViewGeometry::on_table(&mesh, &stand, self.size);
-        let base = base(&seen, stand.elevation(), (self.rays, random.seed()));
+        let seen = ViewGeometry::on_table(&mesh, &stand, view.size);
+        let base = base(&seen, stand.elevation(), (view.rays, random.seed()));
         let finishes = (0..TurnView::FINISHES).flat_map(|_| {
             let finish = Finish::draw(&mut random, seen.buffer(), library, 0.0, false);
             seen.finish_planes(&finish, library)
         });
-        TurnView {
+        Self {
             elevation: stand.elevation(),
             finishes: finishes.collect(),
             base,

@@ -3,7 +3,7 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `photographs`, `turns` | batches of a run |
-//! | `view_loader`, `view_ring` | processor cores cast views once; which of them a step draws from, on the device |
+//! | `view_pool`, `view_loader`, `view_ring` | processor cores cast views once; which of them a step draws from, on the device |
 //! | `direction_maps`, `tensors`, `noise` | what lighting them is made of |
 //! | `symmetry`, `sample` | photographs as the networks see them |
 //! | `turn_reader` | frames of shards |
@@ -17,4 +17,5 @@ mod tensors;
 pub(crate) mod turn_reader;
 pub(crate) mod turns;
 mod view_loader;
+mod view_pool;
 mod view_ring;

@@ -50,11 +50,6 @@ impl ViewPlanes {
         let at = indices(at, self.planes.device())?;
         Ok(self.planes.f_index_select(0, &at)?.f_to_kind(self.kind)?)
     }
-
-    /// Width and height.
-    pub(super) fn side(&self) -> i64 {
-        self.planes.size()[3]
-    }
 }
 
 /// The views that a step draws from, by their numbers. Sample i of a batch is of a view whose number is i modulo the batch: where

@@ -10,16 +10,21 @@ use crate::error::TrainError;
 // Nobody trains more: these keep a slip of the pen from filling the memory.
 const MAX_SAMPLES: u64 = 1_000_000;
 const MAX_SIZE: u32 = 1024;
+// Turns to validate on stay in the device's memory, 5 MB each of 128 x 128.
+const MAX_VALIDATION: u64 = 4096;
 
-/// The data of photographs: the table `[data]`.
+/// Views of objects and rooms around them: the table `[data]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DataSettings {
     /// Width and height of the pictures, a multiple of 32.
     pub size: u32,
-    /// Views from which each step draws.
+    /// Views from which each step draws, at most.
     pub views: u64,
-    /// New views cast at each step, in place of the oldest.
+    /// Views that exist from the first step on; all of them where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_views: Option<u64>,
+    /// New views cast at each step; once there are `views`, in place of the oldest.
     pub new_views: u64,
     /// Rays a pixel of a view.
     pub rays: u32,
@@ -34,6 +39,10 @@ pub struct DataSettings {
     /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panoramas: Option<PathBuf>,
+    /// For turns, a folder of panoramas, or the validation part of a packed library, to validate in; the synthetic ones where
+    /// there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_panoramas: Option<PathBuf>,
     /// Validation samples, from seeds that are not used in training.
     pub validation: u64,
 }
@@ -43,12 +52,14 @@ impl Default for DataSettings {
         Self {
             size: 128,
             views: 256,
+            first_views: None,
             new_views: 1,
             rays: 128,
             variants: 8,
             meshes: None,
             textures: None,
             panoramas: None,
+            validation_panoramas: None,
             validation: 48,
         }
     }
@@ -82,22 +93,45 @@ impl DataSettings {
             "a multiple of 32 up to 1024",
         )?;
         within("data.views", self.views, 1..=MAX_SAMPLES)?;
+        within("data.first_views", self.first_views(), 1..=self.views)?;
         within("data.new_views", self.new_views, 0..=MAX_SAMPLES)?;
         within("data.rays", self.rays, 16..=4096)?;
         within("data.variants", self.variants, 1..=1000)?;
-        within("data.validation", self.validation, 1..=MAX_SAMPLES)
+        within("data.validation", self.validation, 1..=MAX_VALIDATION)
+    }
+
+    /// The same for the networks of photographs, which are validated in the panoramas that they are trained in.
+    pub(crate) fn check_photographs(&self) -> Result<(), TrainError> {
+        let path = self.validation_panoramas.as_ref();
+        let value = path.map_or(String::new(), |path| path.display().to_string());
+        ensure(
+            path.is_none(),
+            "data.validation_panoramas",
+            value,
+            "left out but for turns",
+        )?;
+        self.check()
     }
 
     /// Whether batches of this size can be drawn: the samples of one are of different views.
     pub(crate) fn check_batch(&self, batch: u64) -> Result<(), TrainError> {
-        let needed = format!("at least run.batch, {batch}");
-        ensure(self.views >= batch, "data.views", self.views, &needed)
+        let (needed, views) = (format!("at least run.batch, {batch}"), self.first_views());
+        let name = match self.first_views {
+            Some(_) => "data.first_views",
+            None => "data.views",
+        };
+        ensure(views >= batch, name, views, &needed)
     }
 
-    /// How many views have been cast when a step draws.
-    pub(crate) fn views_at(&self, step: u64) -> u64 {
+    fn first_views(&self) -> u64 {
+        self.first_views.unwrap_or(self.views)
+    }
+
+    /// The views that a step draws from, by their numbers: the oldest, and the first that is not one of them.
+    pub(crate) fn views_at(&self, step: u64) -> (u64, u64) {
         let joined = self.new_views.saturating_mul(step);
-        self.views.saturating_add(joined)
+        let end = self.first_views().saturating_add(joined);
+        (end.saturating_sub(self.views), end)
     }
 }
 

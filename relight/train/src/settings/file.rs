@@ -15,14 +15,40 @@ const CHANGEABLE: [&str; 2] = ["run.log_every", "run.checkpoint_minutes"];
 ///
 /// # Errors
 /// [`TrainError::Io`], [`TrainError::Refused`].
-pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> {
+pub fn read_settings<S: Default + Serialize + DeserializeOwned>(
+    path: &Path,
+) -> Result<S, TrainError> {
+    read_over(&S::default(), path)
+}
+
+/// The same where missing keys have other values than by default.
+pub(super) fn read_over<S: Serialize + DeserializeOwned>(
+    defaults: &S,
+    path: &Path,
+) -> Result<S, TrainError> {
     let text = text::read(path).map_err(TrainError::io(path, "read"))?;
-    toml::from_str(&text).map_err(|fault| {
+    let read = || {
+        // Faults in the text alone are reported with their line.
+        toml::from_str::<S>(&text)?;
+        let mut all = toml::Table::try_from(defaults).unwrap_or_default();
+        put_over(&mut all, toml::from_str(&text)?);
+        all.try_into()
+    };
+    read().map_err(|fault: toml::de::Error| {
         TrainError::Refused(format!(
             "{} is not a settings file: {fault}",
             path.display()
         ))
     })
+}
+
+fn put_over(table: &mut toml::Table, other: toml::Table) {
+    for (key, value) in other {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(table)), toml::Value::Table(other)) => put_over(table, other),
+            (_, value) => drop(table.insert(key, value)),
+        }
+    }
 }
 
 /// The first setting, such as `run.seed`, that another run's settings have otherwise, or why they are none; `None` where

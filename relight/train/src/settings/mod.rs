@@ -3,8 +3,7 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `run` | how long and how fast a network learns: `[run]` |
-//! | `data` | synthetic samples and turns: `[data]`, `[turns]` |
-//! | `transfer` | views and rooms of the network of turns: its `[data]` |
+//! | `data` | views and rooms, turns: `[data]`, `[turns]` |
 //! | `loss`, `paper_phase`, `precision` | loss coefficients; the paper's phases; the precision of a run |
 //! | `file` | reading TOML, and how the settings of two runs differ |
 
@@ -16,7 +15,6 @@ mod precision;
 mod run;
 #[cfg(test)]
 mod tests;
-mod transfer;
 
 use std::fmt::Display;
 use std::ops::{Bound, RangeBounds};
@@ -33,7 +31,6 @@ pub use loss::DecomposeLossCoefficients;
 pub use paper_phase::PaperPhase;
 pub use precision::ComputePrecision;
 pub use run::RunSettings;
-pub use transfer::TransferSettings;
 
 /// The settings of `relight train decompose`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -48,13 +45,27 @@ pub struct DecomposeSettings {
 }
 
 /// The settings of `relight train turn`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TurnNetworkSettings {
     /// How long and how fast.
     pub run: RunSettings,
     /// On what.
-    pub data: TransferSettings,
+    pub data: DataSettings,
+}
+
+impl Default for TurnNetworkSettings {
+    fn default() -> Self {
+        Self {
+            run: RunSettings::default(),
+            data: DataSettings {
+                views: 768,
+                first_views: Some(64),
+                rays: 144,
+                ..DataSettings::default()
+            },
+        }
+    }
 }
 
 impl TurnNetworkSettings {
@@ -108,13 +119,11 @@ impl PaperSettings {
     /// # Errors
     /// As [`read_settings`].
     pub fn from_phase(phase: PaperPhase, file: Option<&Path>) -> Result<Self, TrainError> {
-        let mut settings: Self = file.map_or_else(|| Ok(Self::default()), read_settings)?;
-        let table: toml::Table = file.map_or_else(|| Ok(toml::Table::new()), read_settings)?;
-        let run = table.get("run");
-        if run.is_none_or(|run| run.get("learning_rate").is_none()) {
-            settings.run.learning_rate = phase.default_learning_rate();
-        }
-        Ok(settings)
+        let mut settings = Self::default();
+        settings.run.learning_rate = phase.default_learning_rate();
+        file.map_or(Ok(settings.clone()), |file| {
+            file::read_over(&settings, file)
+        })
     }
 
     /// Whether all numbers are in range.
@@ -123,7 +132,7 @@ impl PaperSettings {
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
-        self.data.check()?;
+        self.data.check_photographs()?;
         check_coefficients(&[
             ("loss.low_rank", self.loss.low_rank),
             ("loss.supervised", self.loss.supervised),
@@ -139,7 +148,7 @@ impl DecomposeSettings {
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
-        self.data.check()?;
+        self.data.check_photographs()?;
         let loss = &self.loss;
         // A part of others: alone it counts nothing.
         check_coefficient("loss.quotient", loss.quotient)?;

@@ -2,8 +2,8 @@
 
 use tch::{Kind, Tensor, no_grad};
 
-use crate::data::turns::{TurnBatch, TurnDraw, Turns};
-use crate::distributed::process_group::{ProcessGroup, indivisible};
+use crate::data::turns::{TurnBatch, Turns};
+use crate::distributed::process_group::ProcessGroup;
 use crate::engine::losses::{Mean, angular_degrees, chord};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
 use crate::engine::terms::LossTerms;
@@ -64,13 +64,8 @@ impl TurnNetworkTask {
         let mut begin = self.validated.len() as u64 * VALIDATION_BATCH;
         while begin < count {
             let end = count.min(begin + VALIDATION_BATCH);
-            let draw = TurnDraw {
-                oldest: begin,
-                end,
-                batch: end - begin,
-                seed: stream(44, begin),
-            };
-            let batch = self.validation.batch(draw)?;
+            let seed = stream(44, begin);
+            let batch = self.validation.batch((begin, end), end - begin, seed)?;
             self.validated.push(batch);
             begin = end;
         }
@@ -159,29 +154,14 @@ impl TrainingTask for TurnNetworkTask {
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
-        let (batch, rank) = (self.settings.run.batch, group.rank());
-        if !batch.is_multiple_of(u64::from(rank.world_size())) {
-            return Err(indivisible(
-                "run.batch",
-                batch,
-                rank,
-                "a multiple of their number",
-            ));
-        }
-        self.training.set_rank(rank);
-        Ok(())
+        self.training
+            .set_rank(group.rank(), self.settings.run.batch)
     }
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let (run, data) = (&self.settings.run, &self.settings.data);
-        let (oldest, end) = data.views_at(step);
-        let draw = TurnDraw {
-            oldest,
-            end,
-            batch: run.batch,
-            seed: stream(stream(run.seed, 43), step),
-        };
-        let batch = self.training.batch(draw)?;
+        let seed = stream(stream(run.seed, 43), step);
+        let batch = self.training.batch(data.views_at(step), run.batch, seed)?;
         let output = self.trainable.model.forward(&batch.input)?;
         let (normals, log_chord) = predicted_normals(&output[0])?;
         let mut terms = LossTerms::default();

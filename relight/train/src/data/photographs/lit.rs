@@ -11,9 +11,10 @@
 use relight_synth::{PhotoPlan, PhotoView};
 use tch::Tensor;
 
-use super::view_pool::ViewPool;
+use super::VISIBILITY;
 use crate::data::direction_maps::DirectionMaps;
 use crate::data::tensors::{columns, dot, indices, of_light, unit, upload};
+use crate::data::view_pool::{FINISHES, Planned, ViewPool};
 use crate::error::TrainError;
 
 /// Albedo is kept in this range.
@@ -21,12 +22,8 @@ const ALBEDO: (f64, f64) = (0.01, 0.95);
 /// How sharp the edges of a print are.
 const PRINT_EDGE: f64 = 15.0;
 
-/// A photograph to be made: the view's place in the pool, and all other parameters.
-#[derive(Debug, Clone)]
-pub(super) struct PlannedPhoto {
-    pub(super) place: usize,
-    pub(super) plan: PhotoPlan,
-}
+/// A photograph to be made.
+pub(super) type PlannedPhoto = Planned<PhotoPlan>;
 
 /// A batch in its light.
 #[derive(Debug)]
@@ -46,15 +43,15 @@ pub(super) struct LitBatch {
 impl LitBatch {
     /// Lights photographs of views.
     pub(super) fn new(
-        pool: &ViewPool,
+        pool: &ViewPool<PhotoView>,
         maps: &DirectionMaps,
         photos: &[PlannedPhoto],
     ) -> Result<Self, TrainError> {
-        let places: Vec<usize> = photos.iter().map(|photo| photo.place).collect();
-        let base = pool.base(&places)?;
+        let base = pool.base(photos)?;
         let part = |from: usize, count: usize| base.f_narrow(1, from as i64, count as i64);
         let mask = part(PhotoView::MASK, 1)?;
-        let finish = pool.finishes(photos.iter().map(|one| (one.place, one.plan.finish)))?;
+        let finishes = photos.iter().map(|one| (one.place, one.plan.finish));
+        let finish = pool.parts(FINISHES, finishes)?;
         let normals = finish.f_narrow(1, 0, 3)?;
         let own_points = part(PhotoView::OBJECT_POINTS, 3)?;
         let printed = printed(pool, photos, &own_points, finish.f_narrow(1, 3, 3)?)?;
@@ -91,7 +88,7 @@ impl LitBatch {
     /// The light of lamps, diffuse and as highlights.
     fn add_lamps(
         &mut self,
-        pool: &ViewPool,
+        pool: &ViewPool<PhotoView>,
         photos: &[PlannedPhoto],
         points: &Tensor,
         eye: &Tensor,
@@ -108,7 +105,7 @@ impl LitBatch {
         let device = points.device();
         let of = |values: Vec<f32>| columns(&values, lit.len(), points);
         let lamp = |&(_, photo, k): &(usize, &PlannedPhoto, usize)| {
-            pool.lamps()[photo.place][photo.plan.lamps[k].lamp]
+            pool.extra[photo.place][photo.plan.lamps[k].lamp]
         };
         let centre = of(lit.iter().flat_map(|one| lamp(one).centre).collect())?;
         let irradiance = of(lit
@@ -118,7 +115,7 @@ impl LitBatch {
         let seen = lit
             .iter()
             .map(|(_, photo, k)| (photo.place, photo.plan.lamps[*k].lamp));
-        let visible = pool.visibility(seen)?;
+        let visible = pool.parts(VISIBILITY, seen)?;
         let whose = indices(lit.iter().map(|(at, ..)| *at), device)?;
 
         let normals = self.normals.f_index_select(0, &whose)?;
@@ -235,7 +232,7 @@ fn lamp_lobe(exponent: f32, reflectance: [f32; 3], half_angle: f32) -> (f32, [f3
 
 /// Albedo with the prints of those photographs that have one.
 fn printed(
-    pool: &ViewPool,
+    pool: &ViewPool<PhotoView>,
     photos: &[PlannedPhoto],
     own_points: &Tensor,
     mut albedo: Tensor,
@@ -253,7 +250,7 @@ fn printed(
     let others = prints
         .iter()
         .map(|(_, place, print)| (*place, print.finish));
-    let other = pool.finishes(others)?.f_narrow(1, 3, 3)?;
+    let other = pool.parts(FINISHES, others)?.f_narrow(1, 3, 3)?;
     let count = prints.len() as i64;
     let waves: Vec<f32> = prints
         .iter()
@@ -323,19 +320,21 @@ mod tests {
     use relight_core::render::cosine_lobe;
     use tch::{Device, Kind};
 
-    use relight_synth::{EnvironmentLights, Folders, Library, PhotoViewRecipe, made_panoramas};
+    use relight_synth::{EnvironmentLights, Folders, Library, ViewRecipe, made_panoramas};
 
     const SIZE: usize = 32;
 
     /// Three views and six photographs, two of each.
-    fn photographs() -> (ViewPool, Vec<PlannedPhoto>, Vec<PhotoView>) {
+    fn photographs() -> (ViewPool<PhotoView>, Vec<PlannedPhoto>, Vec<PhotoView>) {
         let library = Library::read(&Folders::default()).unwrap();
-        let recipe = PhotoViewRecipe {
+        let recipe = ViewRecipe {
             seed: 4,
             size: SIZE as u32,
             rays: 64,
         };
-        let views: Vec<PhotoView> = (0..3).map(|number| recipe.cast(&library, number)).collect();
+        let views: Vec<PhotoView> = (0..3)
+            .map(|number| PhotoView::cast(&recipe, &library, number))
+            .collect();
         let mut pool = ViewPool::new(3, recipe.size, (Kind::Float, Device::Cpu)).unwrap();
         for (place, view) in views.iter().enumerate() {
             pool.put(place, view.clone()).unwrap();

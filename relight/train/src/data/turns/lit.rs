@@ -16,20 +16,16 @@ use std::f64::consts::PI;
 use relight_synth::{CURVE_TERMS, TurnMaterial, TurnPlan, TurnView};
 use tch::Tensor;
 
-use super::turn_pool::TurnPool;
 use crate::data::direction_maps::DirectionMaps;
 use crate::data::tensors::{columns, dot, of_light, unit, upload};
+use crate::data::view_pool::{FINISHES, Planned, ViewPool};
 use crate::error::TrainError;
 
 /// A colour of less than this is black. Numerical.
 const BLACK: f64 = 1e-3;
 
-/// A turn to be made: the view's place in the pool, and all other parameters.
-#[derive(Debug, Clone)]
-pub(super) struct PlannedTurn {
-    pub(super) place: usize,
-    pub(super) plan: TurnPlan,
-}
+/// A turn to be made.
+pub(super) type PlannedTurn = Planned<TurnPlan>;
 
 /// A batch of turns.
 #[derive(Debug)]
@@ -47,18 +43,19 @@ pub(super) struct LitTurns {
 impl LitTurns {
     /// Lights turns of views.
     pub(super) fn new(
-        pool: &TurnPool,
+        pool: &ViewPool<TurnView>,
         maps: &DirectionMaps,
         turns: &[PlannedTurn],
     ) -> Result<Self, TrainError> {
-        let base = pool.base(turns.iter().map(|turn| turn.place))?;
+        let base = pool.base(turns)?;
         let part = |from: usize, count: usize| base.f_narrow(1, from as i64, count as i64);
         let mask = part(TurnView::MASK, 1)?;
-        let finish = pool.finishes(turns.iter().map(|one| (one.place, one.plan.finish)))?;
+        let finishes = turns.iter().map(|one| (one.place, one.plan.finish));
+        let finish = pool.parts(FINISHES, finishes)?;
         let normals = finish.f_narrow(1, 0, 3)?;
         let albedo = painted(turns, &finish.f_narrow(1, 3, 3)?)?.f_mul(&mask)?;
         let lights = lights(turns, &base)?;
-        let to_table = to_table(turns, pool.elevations(), &base)?;
+        let to_table = to_table(turns, &pool.extra, &base)?;
 
         let coefficients = TurnView::ORDER.coefficients();
         let blocked = of_light(&lights, &part(TurnView::BLOCKED, coefficients)?)?;

@@ -1,4 +1,5 @@
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use relight_core::light::{Direction, basis};
 use relight_core::render::cosine_lobe;
@@ -7,22 +8,28 @@ use relight_turn::NetworkTurn;
 use tch::Device;
 
 use super::*;
+use crate::data::direction_maps::DirectionMaps;
+use crate::data::noise::NoiseTiles;
+use crate::data::view_loader::{Cast, ViewLoader};
+use crate::data::view_pool::ViewPool;
 
 const SIZE: usize = 32;
 
 /// Views and turns of them.
-fn planned(count: u64) -> (OpenPool, Vec<PlannedTurn>, Vec<TurnView>) {
+fn planned(count: u64) -> (OpenPool<TurnView>, Vec<PlannedTurn>, Vec<TurnView>) {
     let library = Library::read(&Folders::default()).unwrap();
-    let recipe = TurnViewRecipe {
+    let recipe = ViewRecipe {
         seed: 4,
         size: SIZE as u32,
         rays: 64,
     };
-    let views: Vec<TurnView> = (0..3).map(|number| recipe.cast(&library, number)).collect();
+    let views: Vec<TurnView> = (0..3)
+        .map(|number| TurnView::cast(&recipe, &library, number))
+        .collect();
     let place = (Kind::Float, Device::Cpu);
-    let mut pool = TurnPool::new(3, recipe.size, place).unwrap();
+    let mut pool = ViewPool::new(3, recipe.size, place).unwrap();
     for (place, view) in views.iter().enumerate() {
-        pool.put(place, view).unwrap();
+        pool.put(place, view.clone()).unwrap();
     }
     let made = made_panoramas().unwrap();
     let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
@@ -34,7 +41,7 @@ fn planned(count: u64) -> (OpenPool, Vec<PlannedTurn>, Vec<TurnView>) {
             PlannedTurn { place, plan }
         })
         .collect();
-    let cast: Cast<TurnView> = Arc::new(move |number| recipe.cast(&library, number));
+    let cast: Cast<TurnView> = Arc::new(move |number| TurnView::cast(&recipe, &library, number));
     let resources = Resources {
         device: Device::Cpu,
         workers: 1,
