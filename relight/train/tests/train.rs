@@ -342,7 +342,7 @@ fn answers_mean_the_same_on_tensors_as_one_by_one() {
     let flat = Vec::<f32>::try_from(answer.flatten(0, -1)).unwrap();
     let plain = encoded.decode(&flat);
     let input = Tensor::from_slice(encoded.values()).view([1, 7, SIDE, SIDE]);
-    let tensors = PredictedTensors::new(&input, &answer).unwrap();
+    let tensors = PredictedTensors::new(&input, &answer);
     let inside = input.narrow(1, 3, 1);
     let largest = |tensor: &Tensor, planes: Vec<&[f32]>, scale: f64| {
         let values = Vec::<f32>::try_from((tensor * &inside * scale).flatten(0, -1)).unwrap();

@@ -8,7 +8,6 @@ use relight_core::render::cosine_lobe;
 use tch::{Device, Kind, Tensor};
 
 use super::tensors::upload;
-use crate::error::TrainError;
 
 /// Rows of a map of directions, from +y to -y; columns go once around, the first and the last are the same.
 const ROWS: usize = 25;
@@ -28,41 +27,32 @@ pub(crate) struct DirectionMaps {
 }
 
 impl DirectionMaps {
-    pub(crate) fn new(order: Order, (kind, device): (Kind, Device)) -> Result<Self, TrainError> {
+    pub(crate) fn new(order: Order, (kind, device): (Kind, Device)) -> Self {
         let lobes: Vec<f64> = (0..order.coefficients())
             .map(|at| cosine_lobe(at.isqrt()))
             .collect();
         let harmonics: Vec<f64> = (0..ROWS * COLUMNS)
             .flat_map(|at| harmonics_at(order, at / COLUMNS, at % COLUMNS))
             .collect();
-        let radiance = Tensor::f_from_slice(&harmonics)?
-            .f_reshape([(ROWS * COLUMNS) as i64, lobes.len() as i64])?;
-        let irradiance = radiance.f_mul(&Tensor::f_from_slice(&lobes)?)?;
-        let place = |of: Tensor| of.f_to_kind(kind)?.f_to_device(device);
-        Ok(Self {
-            radiance: place(radiance)?,
-            irradiance: place(irradiance)?,
+        let radiance =
+            Tensor::from_slice(&harmonics).reshape([(ROWS * COLUMNS) as i64, lobes.len() as i64]);
+        let irradiance = &radiance * Tensor::from_slice(&lobes);
+        let place = |of: Tensor| of.to_kind(kind).to_device(device);
+        Self {
+            radiance: place(radiance),
+            irradiance: place(irradiance),
             bands: (0..lobes.len()).map(|at| at.isqrt() as f64).collect(),
-        })
+        }
     }
 
     /// The irradiance of lights (`batch x coefficients x channels`) on surfaces of these unit normals.
-    pub(crate) fn irradiance(
-        &self,
-        lights: &Tensor,
-        normals: &Tensor,
-    ) -> Result<Tensor, TrainError> {
-        look_up(&self.irradiance.f_matmul(lights)?, normals)
+    pub(crate) fn irradiance(&self, lights: &Tensor, normals: &Tensor) -> Tensor {
+        look_up(&self.irradiance.matmul(lights), normals)
     }
 
     /// The radiance of lights from these directions, each light blurred by a Gaussian on the sphere of a standard deviation in
     /// radians.
-    pub(crate) fn radiance(
-        &self,
-        lights: &Tensor,
-        towards: &Tensor,
-        blurs: &[f32],
-    ) -> Result<Tensor, TrainError> {
+    pub(crate) fn radiance(&self, lights: &Tensor, towards: &Tensor, blurs: &[f32]) -> Tensor {
         let left: Vec<f32> = blurs
             .iter()
             .flat_map(|&blur| {
@@ -72,8 +62,8 @@ impl DirectionMaps {
             })
             .collect();
         let shape = [blurs.len() as i64, self.bands.len() as i64, 1];
-        let left = upload(&left, &shape, lights)?;
-        look_up(&self.radiance.f_matmul(&lights.f_mul(&left)?)?, towards)
+        let left = upload(&left, &shape, lights);
+        look_up(&self.radiance.matmul(&(lights * &left)), towards)
     }
 }
 
@@ -90,18 +80,14 @@ fn harmonics_at(order: Order, row: usize, column: usize) -> Vec<f64> {
 }
 
 /// Values of maps (`batch x directions x channels`) at unit vectors (`batch x 3 x side x side`).
-fn look_up(maps: &Tensor, at: &Tensor) -> Result<Tensor, TrainError> {
+fn look_up(maps: &Tensor, at: &Tensor) -> Tensor {
     let channels = maps.size()[2];
     let maps = maps
-        .f_transpose(1, 2)?
-        .f_reshape([-1, channels, ROWS as i64, COLUMNS as i64])?;
-    let axis = |axis: i64| at.f_select(1, axis);
-    let row = axis(1)?
-        .f_clamp(-1.0, 1.0)?
-        .f_acos()?
-        .f_mul_scalar(2.0 / PI)?
-        .f_add_scalar(-1.0)?;
-    let column = axis(0)?.f_atan2(&axis(2)?)?.f_mul_scalar(1.0 / PI)?;
-    let grid = Tensor::f_stack(&[column, row], -1)?;
-    Ok(maps.f_grid_sampler(&grid, BILINEAR, BORDER, true)?)
+        .transpose(1, 2)
+        .reshape([-1, channels, ROWS as i64, COLUMNS as i64]);
+    let axis = |axis: i64| at.select(1, axis);
+    let row = axis(1).clamp(-1.0, 1.0).acos() * (2.0 / PI) - 1.0;
+    let column = axis(0).atan2(&axis(2)) * (1.0 / PI);
+    let grid = Tensor::stack(&[column, row], -1);
+    maps.grid_sampler(&grid, BILINEAR, BORDER, true)
 }

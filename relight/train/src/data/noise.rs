@@ -3,7 +3,6 @@
 use tch::{Device, Kind, Tensor};
 
 use super::tensors::indices;
-use crate::error::TrainError;
 use relight_synth::stream;
 
 /// Tiles of noise: each sample has one of them.
@@ -14,26 +13,22 @@ const TILES: usize = 32;
 pub(crate) struct NoiseTiles(Tensor);
 
 impl NoiseTiles {
-    pub(crate) fn new(
-        (planes, side): (i64, i64),
-        seed: u64,
-        device: Device,
-    ) -> Result<Self, TrainError> {
+    pub(crate) fn new((planes, side): (i64, i64), seed: u64, device: Device) -> Self {
         let count = TILES * (planes * side * side) as usize;
         let values: Vec<half::f16> = (0..count as u64)
             .map(|at| half::f16::from_f32(normal_of(stream(seed, at))))
             .collect();
-        let tiles = Tensor::f_from_slice(&values)?
-            .f_reshape([TILES as i64, planes, side, side])?
-            .f_to_device(device)?;
-        Ok(Self(tiles))
+        let tiles = Tensor::from_slice(&values)
+            .reshape([TILES as i64, planes, side, side])
+            .to_device(device);
+        Self(tiles)
     }
 
     /// One tile for each seed.
-    pub(crate) fn of(&self, seeds: &[u64], kind: Kind) -> Result<Tensor, TrainError> {
+    pub(crate) fn of(&self, seeds: &[u64], kind: Kind) -> Tensor {
         let device = self.0.device();
-        let chosen = indices(seeds.iter().map(|seed| *seed as usize % TILES), device)?;
-        Ok(self.0.f_index_select(0, &chosen)?.f_to_kind(kind)?)
+        let chosen = indices(seeds.iter().map(|seed| *seed as usize % TILES), device);
+        self.0.index_select(0, &chosen).to_kind(kind)
     }
 }
 

@@ -4,7 +4,6 @@ use glam::Vec3;
 use half::f16;
 use tch::{Device, Kind, Tensor};
 
-use crate::error::TrainError;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use relight_photo::decompose::{NetworkInput, PredictedLight};
 use relight_photo::nets::{INPUTS, LIGHT_OUTPUTS};
@@ -142,14 +141,7 @@ fn linear(sample: &SynthSample<'_>, linearisation: Linearisation) -> Planes<3> {
 
 impl TruthBatch {
     /// A batch of samples of one size, on a device, in 32 or 64 bits.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(crate) fn new(
-        samples: &[TruthArrays],
-        kind: Kind,
-        device: Device,
-    ) -> Result<Self, TrainError> {
+    pub(crate) fn new(samples: &[TruthArrays], kind: Kind, device: Device) -> Self {
         let extent = samples
             .first()
             .map_or(Extent::new(0, 0), |first| first.extent);
@@ -158,22 +150,22 @@ impl TruthBatch {
             .flat_map(|sample| sample.values.iter().copied())
             .collect();
         let lights: Vec<f32> = samples.iter().flat_map(|sample| sample.light).collect();
-        let light = Tensor::f_from_slice(&lights)?.f_reshape([-1, LIGHT_OUTPUTS as i64])?;
+        let light = Tensor::from_slice(&lights).reshape([-1, LIGHT_OUTPUTS as i64]);
         let shape = [samples.len(), PLANES, extent.height, extent.width].map(|n| n as i64);
-        let all = Tensor::f_from_slice(&values)?
-            .f_reshape(shape)?
-            .f_to_device(device)?
-            .f_to_kind(kind)?;
-        let part = |from: usize, count: usize| all.f_narrow(1, from as i64, count as i64);
-        Ok(Self {
-            input: part(0, INPUTS)?,
-            mask: part(relight_photo::decompose::MASK, 1)?,
-            picture: part(INPUTS, 3)?,
-            shading: part(INPUTS + 3, 1)?,
-            albedo: part(INPUTS + 4, 3)?,
-            normals: part(INPUTS + 7, 3)?,
-            highlight: part(INPUTS + 10, 1)?,
-            light: light.f_to_device(device)?.f_to_kind(kind)?,
-        })
+        let all = Tensor::from_slice(&values)
+            .reshape(shape)
+            .to_device(device)
+            .to_kind(kind);
+        let part = |from: usize, count: usize| all.narrow(1, from as i64, count as i64);
+        Self {
+            input: part(0, INPUTS),
+            mask: part(relight_photo::decompose::MASK, 1),
+            picture: part(INPUTS, 3),
+            shading: part(INPUTS + 3, 1),
+            albedo: part(INPUTS + 4, 3),
+            normals: part(INPUTS + 7, 3),
+            highlight: part(INPUTS + 10, 1),
+            light: light.to_device(device).to_kind(kind),
+        }
     }
 }

@@ -131,7 +131,7 @@ impl TurnReader {
         self.cursor = drawn.next;
         let frames = if drawn.batch.frames.len() >= 2 {
             self.readable = self.cursor.epoch;
-            Some(tensors(&drawn.batch, kind, device)?)
+            Some(tensors(&drawn.batch, kind, device))
         } else {
             None
         };
@@ -159,24 +159,24 @@ fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Cursor) -> Result<Stream<Turn
     Ok(Stream::start(turns, streaming)?)
 }
 
-fn tensors(batch: &TurnBatch, kind: Kind, device: Device) -> Result<TurnTensors, TrainError> {
+fn tensors(batch: &TurnBatch, kind: Kind, device: Device) -> TurnTensors {
     let (frames, extent) = (batch.frames.len(), batch.extent);
     let shape = |channels: usize| [frames, channels, extent.height, extent.width].map(|n| n as i64);
     let tensor = |values: &[f32], channels: usize| {
-        Tensor::f_from_slice(values)?
-            .f_reshape(shape(channels))?
-            .f_to_device(device)?
-            .f_to_kind(kind)
+        Tensor::from_slice(values)
+            .reshape(shape(channels))
+            .to_device(device)
+            .to_kind(kind)
     };
     let opens = |(at, frame): (usize, &TurnFrame)| match &frame.record {
         Some(record) => record.spec_net,
         None => is_saturated(batch, at),
     };
-    Ok(TurnTensors {
-        picture: tensor(&batch.images, 3)?,
-        mask: tensor(&batch.masks, 1)?,
+    TurnTensors {
+        picture: tensor(&batch.images, 3),
+        mask: tensor(&batch.masks, 1),
         spec_net: batch.frames.iter().enumerate().map(opens).collect(),
-    })
+    }
 }
 
 /// Whether the gate opens for a frame that has no record, as in the layout of the paper's released data set: by the

@@ -62,37 +62,32 @@ pub(super) struct ViewPool<V: PooledView> {
 
 impl<V: PooledView> ViewPool<V> {
     /// Room for so many views of a size; what is computed of them is of a kind.
-    pub(super) fn new(views: usize, size: u32, place: (Kind, Device)) -> Result<Self, TrainError> {
+    pub(super) fn new(views: usize, size: u32, place: (Kind, Device)) -> Self {
         let planes = V::PLANES
             .iter()
             .map(|&(each, planes)| ViewPlanes::new((views, each), [planes, size as usize], place));
-        Ok(Self {
-            planes: planes.collect::<Result<_, _>>()?,
+        Self {
+            planes: planes.collect(),
             extra: vec![V::Extra::default(); views],
-        })
+        }
     }
 
     /// Puts a view at a place.
-    pub(super) fn put(&mut self, place: usize, view: V) -> Result<(), TrainError> {
+    pub(super) fn put(&mut self, place: usize, view: V) {
         let (values, extra) = view.into_planes();
         for (planes, values) in self.planes.iter().zip(values) {
-            planes.put(place, &values)?;
+            planes.put(place, &values);
         }
         self.extra[place] = extra;
-        Ok(())
     }
 
     /// The base planes of the views of samples, `samples x planes x side x side`.
-    pub(super) fn base(&self, samples: &[Planned<V::Plan>]) -> Result<Tensor, TrainError> {
+    pub(super) fn base(&self, samples: &[Planned<V::Plan>]) -> Tensor {
         self.parts(BASE, samples.iter().map(|one| (one.place, 0)))
     }
 
     /// Parts of a tensor of planes, each by its view's place and its number.
-    pub(super) fn parts(
-        &self,
-        of: usize,
-        chosen: impl Iterator<Item = (usize, usize)>,
-    ) -> Result<Tensor, TrainError> {
+    pub(super) fn parts(&self, of: usize, chosen: impl Iterator<Item = (usize, usize)>) -> Tensor {
         self.planes[of].of(chosen)
     }
 }
@@ -216,7 +211,7 @@ impl<V: PooledView> ViewSource<V> {
         let ring = open.pool.extra.len();
         while open.loader.next_number() < end {
             let place = window.place(open.loader.next_number(), ring);
-            open.pool.put(place, open.loader.next_view()?)?;
+            open.pool.put(place, open.loader.next_view()?);
         }
         let (seeds, places) = window.draw(seed, ring);
         let (rooms, extra) = (&self.rooms, &open.pool.extra);
@@ -236,10 +231,10 @@ impl<V: PooledView> ViewSource<V> {
         let cast: Cast<V> = Arc::new(move |number| V::cast(&recipe, &library, number));
         let planes = [V::NOISE as i64, i64::from(self.recipe.size)];
         Ok(OpenPool {
-            pool: ViewPool::new(views, self.recipe.size, place)?,
+            pool: ViewPool::new(views, self.recipe.size, place),
             loader: ViewLoader::start(&cast, self.rank, first, &self.resources)?,
-            maps: DirectionMaps::new(V::ORDER, place)?,
-            noise: NoiseTiles::new((planes[0], planes[1]), self.noise_seed, place.1)?,
+            maps: DirectionMaps::new(V::ORDER, place),
+            noise: NoiseTiles::new((planes[0], planes[1]), self.noise_seed, place.1),
         })
     }
 }

@@ -3,7 +3,6 @@
 use tch::{Device, Kind, Tensor};
 
 use super::tensors::indices;
-use crate::error::TrainError;
 use relight_core::reader::Rank;
 use relight_synth::stream;
 
@@ -24,31 +23,27 @@ impl ViewPlanes {
         (views, each): (usize, usize),
         [planes, side]: [usize; 2],
         (kind, device): (Kind, Device),
-    ) -> Result<Self, TrainError> {
+    ) -> Self {
         let shape = [views * each, planes, side, side].map(|size| size as i64);
-        Ok(Self {
-            planes: Tensor::f_zeros(shape, (Kind::Half, device))?,
+        Self {
+            planes: Tensor::zeros(shape, (Kind::Half, device)),
             each,
             kind,
-        })
+        }
     }
 
     /// Puts a view at a place.
-    pub(super) fn put(&self, place: usize, values: &[half::f16]) -> Result<(), TrainError> {
+    pub(super) fn put(&self, place: usize, values: &[half::f16]) {
         let each = self.each as i64;
-        let mut to = self.planes.f_narrow(0, place as i64 * each, each)?;
-        to.f_copy_(&Tensor::f_from_slice(values)?.f_reshape(to.size())?)?;
-        Ok(())
+        let mut to = self.planes.narrow(0, place as i64 * each, each);
+        to.copy_(&Tensor::from_slice(values).reshape(to.size()));
     }
 
     /// Parts, each by its view's place and its number: `parts x planes x side x side`.
-    pub(super) fn of(
-        &self,
-        chosen: impl Iterator<Item = (usize, usize)>,
-    ) -> Result<Tensor, TrainError> {
+    pub(super) fn of(&self, chosen: impl Iterator<Item = (usize, usize)>) -> Tensor {
         let at = chosen.map(|(place, part)| place * self.each + part);
-        let at = indices(at, self.planes.device())?;
-        Ok(self.planes.f_index_select(0, &at)?.f_to_kind(self.kind)?)
+        let at = indices(at, self.planes.device());
+        self.planes.index_select(0, &at).to_kind(self.kind)
     }
 }
 

@@ -53,10 +53,7 @@ impl AllReducedLosses {
     }
 
     /// What this process adds to the all-reduced loss, to be descended; `None` if it has nothing.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(crate) fn part(&self, losses: &StepLosses) -> Result<Option<Tensor>, TrainError> {
+    pub(crate) fn part(&self, losses: &StepLosses) -> Option<Tensor> {
         losses.terms.total(&self.parts)
     }
 }

@@ -5,8 +5,6 @@
 
 use tch::Tensor;
 
-use crate::error::TrainError;
-
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
 /// A chord so short counts as its square, for a gradient where it is 0.
@@ -23,165 +21,107 @@ pub(crate) struct Mean {
 
 /// Error that a factor of each picture cannot mend, as a part of the ground truth's energy: 0 for a multiple
 /// of the ground truth, 1 for nothing of it. (The scale-invariant error of Grosse et al. 2009, relative.)
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn scale_invariant(
-    found: &Tensor,
-    truth: &Tensor,
-    weight: &Tensor,
-) -> Result<Tensor, TrainError> {
+pub(crate) fn scale_invariant(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Tensor {
     let sum = |a: &Tensor, b: &Tensor| {
-        a.f_mul(b)?
-            .f_mul(weight)?
-            .f_flatten(1, -1)?
-            .f_sum_dim_intlist([1_i64].as_slice(), false, None)
+        (a * b * weight)
+            .flatten(1, -1)
+            .sum_dim_intlist([1_i64].as_slice(), false, None)
     };
-    let factor = sum(truth, found)?.f_div(&sum(found, found)?.f_add_scalar(TINY)?)?;
-    let scaled = found.f_mul(&factor.f_view([-1, 1, 1, 1])?)?;
-    let rest = truth.f_sub(&scaled)?;
-    let part = sum(&rest, &rest)?.f_div(&sum(truth, truth)?.f_add_scalar(TINY)?)?;
-    Ok(part.f_mean(None)?)
+    let factor = sum(truth, found) / (sum(found, found) + TINY);
+    let scaled = found * factor.view([-1, 1, 1, 1]);
+    let rest = truth - &scaled;
+    let part = sum(&rest, &rest) / (sum(truth, truth) + TINY);
+    part.mean(None)
 }
 
 /// The same in windows of `side` pixels at half their side, each with a factor of its own; energies
 /// are added up before they are divided. (The local error of Grosse et al. 2009, made
 /// differentiable.) One channel.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn windowed(
-    found: &Tensor,
-    truth: &Tensor,
-    weight: &Tensor,
-    side: i64,
-) -> Result<Tensor, TrainError> {
+pub(crate) fn windowed(found: &Tensor, truth: &Tensor, weight: &Tensor, side: i64) -> Tensor {
     let step = (side / 2).max(1);
     let pool = |a: &Tensor, b: &Tensor| {
-        a.f_mul(b)?
-            .f_mul(weight)?
-            .f_avg_pool2d([side; 2], [step; 2], [0; 2], false, true, None)
+        (a * b * weight).avg_pool2d([side; 2], [step; 2], [0; 2], false, true, None)
     };
-    let (tt, tf, ff) = (
-        pool(truth, truth)?,
-        pool(truth, found)?,
-        pool(found, found)?,
-    );
-    let mean = ff.f_mean_dim([1_i64, 2, 3].as_slice(), true, None)?;
+    let (tt, tf, ff) = (pool(truth, truth), pool(truth, found), pool(found, found));
+    let mean = ff.mean_dim([1_i64, 2, 3].as_slice(), true, None);
     // A window in which nothing is found has no factor.
-    let floor = mean.f_mul_scalar(1e-5)?.f_add_scalar(1e-8)?;
-    let explained = tf.f_square()?.f_div(&ff.f_add(&floor)?)?;
+    let floor = &mean * 1e-5 + 1e-8;
+    let explained = tf.square() / (&ff + &floor);
     let over = [1_i64, 2, 3];
-    let rest = tt.f_sub(&explained)?.f_clamp_min(0.0)?;
-    let rest = rest.f_sum_dim_intlist(over.as_slice(), false, None)?;
-    let all = tt.f_sum_dim_intlist(over.as_slice(), false, None)?;
-    Ok(rest.f_div(&all.f_add_scalar(TINY)?)?.f_mean(None)?)
+    let rest = (&tt - &explained).clamp_min(0.0);
+    let rest = rest.sum_dim_intlist(over.as_slice(), false, None);
+    let all = tt.sum_dim_intlist(over.as_slice(), false, None);
+    (&rest / (&all + TINY)).mean(None)
 }
 
 /// Mean differences of the steps from pixel to pixel, down and across, for logarithms of pictures: what sharpens
 /// edges and leaves flat parts flat. Their sum is the loss.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn gradient(
-    found: &Tensor,
-    truth: &Tensor,
-    weight: &Tensor,
-) -> Result<[Mean; 2], TrainError> {
-    let along = |dimension: i64| -> Result<Mean, tch::TchError> {
+pub(crate) fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> [Mean; 2] {
+    let along = |dimension: i64| {
         let step = |of: &Tensor| {
             let length = of.size()[dimension as usize] - 1;
-            Ok::<_, tch::TchError>((
-                of.f_narrow(dimension, 1, length)?,
-                of.f_narrow(dimension, 0, length)?,
-            ))
+            (
+                of.narrow(dimension, 1, length),
+                of.narrow(dimension, 0, length),
+            )
         };
-        let (found, truth, weight) = (step(found)?, step(truth)?, step(weight)?);
-        let both = weight.0.f_mul(&weight.1)?;
-        let error = found.0.f_sub(&found.1)?.f_sub(&truth.0.f_sub(&truth.1)?)?;
+        let (found, truth, weight) = (step(found), step(truth), step(weight));
+        let both = &weight.0 * &weight.1;
+        let error = &found.0 - &found.1 - (&truth.0 - &truth.1);
         let channels = error.size()[1] as f64;
-        let sum = error.f_abs()?.f_mul(&both)?.f_sum(None)?;
-        let over = both
-            .f_sum(None)?
-            .f_mul_scalar(channels)?
-            .f_add_scalar(TINY)?;
-        let value = sum.f_div(&over)?;
-        Ok(Mean { value, over })
+        let sum = (error.abs() * &both).sum(None);
+        let over = both.sum(None) * channels + TINY;
+        let value = &sum / &over;
+        Mean { value, over }
     };
-    Ok([along(2)?, along(3)?])
+    [along(2), along(3)]
 }
 
 /// `1 - cos` of the angle between unit normals, mean under the weight.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
-    let cosine = found
-        .f_mul(truth)?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
-    let error = cosine.f_neg()?.f_add_scalar(1.0)?.f_mul(weight)?;
-    let over = weight.f_sum(None)?.f_add_scalar(TINY)?;
-    let value = error.f_sum(None)?.f_div(&over)?;
-    Ok(Mean { value, over })
+pub(crate) fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Mean {
+    let cosine = (found * truth).sum_dim_intlist([1_i64].as_slice(), true, None);
+    let error = (-&cosine + 1.0) * weight;
+    let over = weight.sum(None) + TINY;
+    let value = error.sum(None) / &over;
+    Mean { value, over }
 }
 
 /// Length of the chord between unit normals, `2 sin(angle / 2)`, mean under the weight. It grows as the angle does and not
 /// as its square: where two surfaces are possible, the likelier one costs least, and not the flat mean of both.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
-    let length = found
-        .f_sub(truth)?
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_add_scalar(CHORD_FLOOR * CHORD_FLOOR)?
-        .f_sqrt()?
-        .f_add_scalar(-CHORD_FLOOR)?;
-    let over = weight.f_sum(None)?.f_add_scalar(TINY)?;
-    let value = length.f_mul(weight)?.f_sum(None)?.f_div(&over)?;
-    Ok(Mean { value, over })
+pub(crate) fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Mean {
+    let length = ((found - truth)
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        + (CHORD_FLOOR * CHORD_FLOOR))
+        .sqrt()
+        - CHORD_FLOOR;
+    let over = weight.sum(None) + TINY;
+    let value = (&length * weight).sum(None) / &over;
+    Mean { value, over }
 }
 
 /// Distance of vectors (`batch x numbers`) from the true ones in parts of their length, mean over the batch without those of
 /// which the truth is 0: it is not known.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainError> {
-    let length = |of: &Tensor| {
-        of.f_square()?
-            .f_sum_dim_intlist([1_i64].as_slice(), false, None)?
-            .f_add_scalar(TINY)?
-            .f_sqrt()
-    };
-    let of_truth = length(truth)?;
-    let known = of_truth.f_gt(2.0 * TINY.sqrt())?.f_to_kind(truth.kind())?;
-    let part = length(&found.f_sub(truth)?)?
-        .f_div(&of_truth)?
-        .f_mul(&known)?;
+pub(crate) fn relative_distance(found: &Tensor, truth: &Tensor) -> Mean {
+    let length =
+        |of: &Tensor| (of.square().sum_dim_intlist([1_i64].as_slice(), false, None) + TINY).sqrt();
+    let of_truth = length(truth);
+    let known = of_truth.gt(2.0 * TINY.sqrt()).to_kind(truth.kind());
+    let part = length(&(found - truth)) / &of_truth * &known;
     // Of few numbers: anything added to them would show where a batch is divided.
-    let over = known.f_sum(None)?.f_clamp_min(TINY)?;
-    let value = part.f_sum(None)?.f_div(&over)?;
-    Ok(Mean { value, over })
+    let over = known.sum(None).clamp_min(TINY);
+    let value = part.sum(None) / &over;
+    Mean { value, over }
 }
 
 /// Mean angle between unit normals under the weight, degrees.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn angular_degrees(
-    found: &Tensor,
-    truth: &Tensor,
-    weight: &Tensor,
-) -> Result<Tensor, TrainError> {
-    let cosine = found
-        .f_mul(truth)?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_clamp(-1.0, 1.0)?;
-    let angle = cosine.f_acos()?.f_rad2deg()?.f_mul(weight)?;
-    let weights = weight.f_sum(None)?.f_add_scalar(TINY)?;
-    Ok(angle.f_sum(None)?.f_div(&weights)?)
+pub(crate) fn angular_degrees(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Tensor {
+    let cosine = (found * truth)
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        .clamp(-1.0, 1.0);
+    let angle = cosine.acos().rad2deg() * weight;
+    let weights = weight.sum(None) + TINY;
+    angle.sum(None) / &weights
 }
 
 #[cfg(test)]
@@ -207,12 +147,9 @@ mod tests {
     #[test]
     fn the_likelier_of_two_surfaces_costs_less_than_their_flat_mean() {
         let truth = tilted(&[40.0, 40.0, -40.0]);
-        let cost = |loss: fn(&Tensor, &Tensor, &Tensor) -> Result<Mean, TrainError>, tilt: f64| {
+        let cost = |loss: fn(&Tensor, &Tensor, &Tensor) -> Mean, tilt: f64| {
             let found = tilted(&[tilt; 3]);
-            loss(&found, &truth, &even(3))
-                .unwrap()
-                .value
-                .double_value(&[])
+            loss(&found, &truth, &even(3)).value.double_value(&[])
         };
         assert!(cost(chord, 40.0) < cost(chord, 15.0));
         assert!(cost(angular, 40.0) > cost(angular, 15.0));
@@ -226,7 +163,7 @@ mod tests {
             [2.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             [7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0],
         ]);
-        let distance = relative_distance(&found, &truth).unwrap();
+        let distance = relative_distance(&found, &truth);
         assert!((distance.value.double_value(&[]) - 1.0 / 5.0_f64.sqrt()).abs() < 1e-3);
         assert!((distance.over.double_value(&[]) - 1.0).abs() < 1e-5);
     }
@@ -234,10 +171,10 @@ mod tests {
     #[test]
     fn a_chord_is_as_long_as_the_angle_says_and_has_a_gradient_where_it_is_none() {
         let (found, truth) = (tilted(&[30.0]), tilted(&[-30.0]));
-        let length = chord(&found, &truth, &even(1)).unwrap().value;
+        let length = chord(&found, &truth, &even(1)).value;
         assert!((length.double_value(&[]) - 1.0).abs() < CHORD_FLOOR);
         let exact = truth.set_requires_grad(true);
-        let none = chord(&exact, &tilted(&[-30.0]), &even(1)).unwrap().value;
+        let none = chord(&exact, &tilted(&[-30.0]), &even(1)).value;
         none.backward();
         assert!(none.double_value(&[]).abs() < 1e-12);
         assert_eq!(exact.grad().abs().max().double_value(&[]), 0.0);

@@ -6,6 +6,7 @@ pub(crate) mod all_reduced;
 pub(crate) mod checkpoint;
 pub(crate) mod cuda;
 pub(crate) mod divergence_guard;
+mod guard;
 pub(crate) mod learning_rate;
 pub(crate) mod losses;
 pub(crate) mod memory;

@@ -15,6 +15,7 @@ use relit_data::causes::with_causes;
 use super::all_reduced::AllReducedLosses;
 use super::checkpoint::Checkpoint;
 use super::divergence_guard::DivergenceGuard;
+use super::guard::guarded;
 use super::learning_rate::learning_rate;
 use super::metrics_log::MetricsLog;
 use super::task::{StepLosses, TrainingTask, Validation};
@@ -217,7 +218,7 @@ impl<'a> Run<'a> {
         observer: &mut dyn TrainObserver,
     ) -> Result<bool, TrainError> {
         let learning_rate = learning_rate(self.settings, self.step);
-        let losses = self.task.step(self.step)?;
+        let losses = guarded(|| self.task.step(self.step))?;
         if let Some(damage) = &losses.damage {
             self.damaged = true;
             observer.damaged(self.step, damage);
@@ -242,7 +243,7 @@ impl<'a> Run<'a> {
         learning_rate: f64,
     ) -> Result<f64, TrainError> {
         let trainable = self.task.trainable();
-        match reduced.part(losses)? {
+        match reduced.part(losses) {
             Some(part) => part.f_backward()?,
             None => trainable.model.add_zero_gradients()?,
         }
@@ -320,7 +321,7 @@ impl<'a> Run<'a> {
             figures,
             sheet,
             damage,
-        } = match self.task.validate() {
+        } = match guarded(|| self.task.validate()) {
             // The next step sees that, too, and all processes stop after it.
             Err(TrainError::Stopped) => return Ok(BTreeMap::new()),
             made => made?,

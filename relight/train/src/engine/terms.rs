@@ -21,18 +21,9 @@ struct Term {
 impl LossTerms {
     /// Adds a loss that is a mean over the samples of the batch. Where several processes share a batch, each has as many
     /// of them.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub fn add(
-        &mut self,
-        name: &'static str,
-        coefficient: f64,
-        value: Tensor,
-    ) -> Result<(), TrainError> {
-        let over = Tensor::f_from_slice(&[1.0_f64])?;
+    pub fn add(&mut self, name: &'static str, coefficient: f64, value: Tensor) {
+        let over = Tensor::from_slice(&[1.0_f64]);
         self.add_mean(name, coefficient, Mean { value, over });
-        Ok(())
     }
 
     /// Adds a loss that is a mean over something else, as over pixels. Several of one name are parts of one loss.
@@ -75,21 +66,18 @@ impl LossTerms {
 
     /// The weighted sum, with each loss scaled by its entry of `parts`: 1 for all of it. `None` if there is
     /// nothing.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(crate) fn total(&self, parts: &[f64]) -> Result<Option<Tensor>, TrainError> {
+    pub(crate) fn total(&self, parts: &[f64]) -> Option<Tensor> {
         let mut total: Option<Tensor> = None;
         for (term, part) in self.0.iter().zip(parts) {
             if let Some(mean) = &term.mean {
-                let loss = mean.value.f_mul_scalar(term.coefficient * part)?;
+                let loss = &mean.value * (term.coefficient * part);
                 total = Some(match total {
-                    Some(total) => total.f_add(&loss)?,
+                    Some(total) => &total + &loss,
                     None => loss,
                 });
             }
         }
-        Ok(total)
+        total
     }
 
     /// Values in the order of [`Self::means`] by name, each times its coefficient, and their sum as `loss`.

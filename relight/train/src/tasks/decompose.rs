@@ -6,7 +6,6 @@ use super::shadow_vs_paint::ShadowVsPaint;
 use crate::data::sample::TruthBatch;
 use crate::engine::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
 use crate::engine::terms::LossTerms;
-use crate::error::TrainError;
 use crate::settings::DecomposeLossCoefficients;
 use relight_photo::decompose::{HIGHLIGHT_OFFSET, LOG_LUMINANCE, LOG_SHADING, MIN_FACING};
 
@@ -43,74 +42,57 @@ pub struct PredictedTensors {
 
 impl PredictedTensors {
     /// The maps for the network's input and its outputs.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub fn from_outputs(input: &Tensor, outputs: &[Tensor]) -> Result<Self, TrainError> {
+    pub fn from_outputs(input: &Tensor, outputs: &[Tensor]) -> Self {
         let head = |at: usize| outputs.get(at).map(Tensor::shallow_clone);
-        Ok(Self {
+        Self {
             paint: head(1),
             light: head(2),
-            ..Self::new(input, &outputs[0])?
-        })
+            ..Self::new(input, &outputs[0])
+        }
     }
 
     /// The maps for the network's input and its output `maps`.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub fn new(input: &Tensor, prediction: &Tensor) -> Result<Self, TrainError> {
-        let part = |from: i64, count: i64| prediction.f_narrow(1, from, count);
-        let facing = part(2, 1)?
-            .f_softplus()?
-            .f_add_scalar(f64::from(MIN_FACING))?;
-        let normals = Tensor::f_cat(&[part(0, 2)?, facing], 1)?;
+    pub fn new(input: &Tensor, prediction: &Tensor) -> Self {
+        let part = |from: i64, count: i64| prediction.narrow(1, from, count);
+        let facing = part(2, 1).softplus() + f64::from(MIN_FACING);
+        let normals = Tensor::cat(&[part(0, 2), facing], 1);
         let length = normals
-            .f_square()?
-            .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-            .f_sqrt()?;
-        let log_luminance = input
-            .f_narrow(1, LOG_LUMINANCE as i64, 1)?
-            .f_mul_scalar(2.0)?
-            .f_add_scalar(-2.0)?;
-        let log_shading = part(7, 1)?
-            .f_add(&part(8, 1)?.f_sigmoid()?.f_mul(&log_luminance)?)?
-            .f_clamp(f64::from(LOG_SHADING.0), f64::from(LOG_SHADING.1))?;
-        Ok(Self {
-            normals: normals.f_div(&length)?,
-            albedo: part(3, 3)?.f_sigmoid()?,
-            shading: log_shading.f_exp()?,
-            highlight: part(6, 1)?
-                .f_add_scalar(-f64::from(HIGHLIGHT_OFFSET))?
-                .f_softplus()?,
+            .square()
+            .sum_dim_intlist([1_i64].as_slice(), true, None)
+            .sqrt();
+        let log_luminance = input.narrow(1, LOG_LUMINANCE as i64, 1) * 2.0 - 2.0;
+        let log_shading = (part(7, 1) + part(8, 1).sigmoid() * &log_luminance)
+            .clamp(f64::from(LOG_SHADING.0), f64::from(LOG_SHADING.1));
+        Self {
+            normals: &normals / &length,
+            albedo: part(3, 3).sigmoid(),
+            shading: log_shading.exp(),
+            highlight: (part(6, 1) - f64::from(HIGHLIGHT_OFFSET)).softplus(),
             paint: None,
             light: None,
-        })
+        }
     }
 }
 
 /// The weighted losses of a batch.
-///
-/// # Errors
-/// [`TrainError::Torch`].
 pub(crate) fn decompose_losses(
     batch: &TruthBatch,
     prediction: &PredictedTensors,
     coefficients: &DecomposeLossCoefficients,
-) -> Result<LossTerms, TrainError> {
+) -> LossTerms {
     let mut terms = LossTerms::default();
     let mask = &batch.mask;
-    let (albedo, found_albedo) = (grey(&batch.albedo)?, grey(&prediction.albedo)?);
-    let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
-    let quotient = grey(&diffuse)?.f_div(&prediction.shading.f_add_scalar(DIVISOR_FLOOR)?)?;
+    let (albedo, found_albedo) = (grey(&batch.albedo), grey(&prediction.albedo));
+    let diffuse = (&batch.picture - &batch.highlight).clamp_min(0.0);
+    let quotient = grey(&diffuse) / (&prediction.shading + DIVISOR_FLOOR);
 
     let whole = coefficients.whole;
-    let error = scale_invariant(&prediction.shading, &batch.shading, mask)?;
-    terms.add("shading", whole, error)?;
-    let error = scale_invariant(&prediction.albedo, &batch.albedo, mask)?;
-    terms.add("albedo", whole, error)?;
-    let error = scale_invariant(&quotient, &albedo, mask)?;
-    terms.add("quotient", whole * coefficients.quotient, error)?;
+    let error = scale_invariant(&prediction.shading, &batch.shading, mask);
+    terms.add("shading", whole, error);
+    let error = scale_invariant(&prediction.albedo, &batch.albedo, mask);
+    terms.add("albedo", whole, error);
+    let error = scale_invariant(&quotient, &albedo, mask);
+    terms.add("quotient", whole * coefficients.quotient, error);
 
     let height = mask.size()[2];
     let narrow = (height / 16).max(4);
@@ -125,77 +107,67 @@ pub(crate) fn decompose_losses(
         ),
     ] {
         let coefficient = coefficients.windows * part;
-        let near = windowed(found, truth, mask, narrow)?;
-        let far = windowed(found, truth, mask, 3 * narrow)?;
-        terms.add(name, coefficient, near.f_add(&far.f_mul_scalar(0.5)?)?)?;
+        let near = windowed(found, truth, mask, narrow);
+        let far = windowed(found, truth, mask, 3 * narrow);
+        terms.add(name, coefficient, &near + &far * 0.5);
     }
 
-    let log = |of: &Tensor, floor: f64| of.f_add_scalar(floor)?.f_log();
+    let log = |of: &Tensor, floor: f64| (of + floor).log();
     let steps = gradient(
-        &log(&prediction.shading, SHADING_FLOOR)?,
-        &log(&batch.shading, SHADING_FLOOR)?,
+        &log(&prediction.shading, SHADING_FLOOR),
+        &log(&batch.shading, SHADING_FLOOR),
         mask,
-    )?;
+    );
     for mean in steps {
         terms.add_mean("shading_steps", coefficients.gradient, mean);
     }
     let steps = gradient(
-        &log(&found_albedo, ALBEDO_FLOOR)?,
-        &log(&albedo, ALBEDO_FLOOR)?,
+        &log(&found_albedo, ALBEDO_FLOOR),
+        &log(&albedo, ALBEDO_FLOOR),
         mask,
-    )?;
+    );
     for mean in steps {
         terms.add_mean("albedo_steps", coefficients.gradient * 0.5, mean);
     }
-    let distance = chord(&prediction.normals, &batch.normals, mask)?;
+    let distance = chord(&prediction.normals, &batch.normals, mask);
     terms.add_mean("normals", coefficients.normals, distance);
-    let highlight = highlight_error(batch, prediction)?;
+    let highlight = highlight_error(batch, prediction);
     terms.add_mean("highlight", coefficients.highlight, highlight);
-    let energy = highlight_energy_error(batch, prediction)?;
+    let energy = highlight_energy_error(batch, prediction);
     terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
     if let Some(logit) = &prediction.paint {
-        let truth = ShadowVsPaint::new(&batch.albedo, &batch.shading, mask)?;
-        terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit)?);
+        let truth = ShadowVsPaint::new(&batch.albedo, &batch.shading, mask);
+        terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit));
     }
     if let Some(light) = &prediction.light {
-        let distance = relative_distance(light, &batch.light)?;
+        let distance = relative_distance(light, &batch.light);
         terms.add_mean("light", coefficients.light, distance);
     }
-    Ok(terms)
+    terms
 }
 
 /// Mean absolute error, in which highlights count more than their absence.
-fn highlight_error(batch: &TruthBatch, prediction: &PredictedTensors) -> Result<Mean, TrainError> {
+fn highlight_error(batch: &TruthBatch, prediction: &PredictedTensors) -> Mean {
     let truth = &batch.highlight;
-    let emphasis = truth
-        .f_clamp(0.0, FULL_HIGHLIGHT)?
-        .f_mul_scalar(HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT)?
-        .f_add_scalar(1.0)?
-        .f_mul(&batch.mask)?;
-    let error = prediction
-        .highlight
-        .f_sub(truth)?
-        .f_abs()?
-        .f_mul(&emphasis)?;
-    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
-    let value = error.f_sum(None)?.f_div(&over)?;
-    Ok(Mean { value, over })
+    let emphasis = (truth.clamp(0.0, FULL_HIGHLIGHT) * (HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT) + 1.0)
+        * &batch.mask;
+    let error = (&prediction.highlight - truth).abs() * &emphasis;
+    let over = batch.mask.sum(None).clamp_min(1.0);
+    let value = error.sum(None) / &over;
+    Mean { value, over }
 }
 
 /// Energy of the error as a part of the energy of the batch's highlights: 1 for a prediction without any. A batch
 /// with hardly any highlight counts as if it had a faint one.
-fn highlight_energy_error(
-    batch: &TruthBatch,
-    prediction: &PredictedTensors,
-) -> Result<Mean, TrainError> {
-    let energy = |of: &Tensor| of.f_square()?.f_mul(&batch.mask)?.f_sum(None);
-    let faint = batch.mask.f_sum(None)?.f_mul_scalar(FAINT_ENERGY)?;
-    let over = energy(&batch.highlight)?.f_add(&faint)?;
-    let error = energy(&prediction.highlight.f_sub(&batch.highlight)?)?;
-    let value = error.f_div(&over)?;
-    Ok(Mean { value, over })
+fn highlight_energy_error(batch: &TruthBatch, prediction: &PredictedTensors) -> Mean {
+    let energy = |of: &Tensor| (of.square() * &batch.mask).sum(None);
+    let faint = batch.mask.sum(None) * FAINT_ENERGY;
+    let over = energy(&batch.highlight) + &faint;
+    let error = energy(&(&prediction.highlight - &batch.highlight));
+    let value = &error / &over;
+    Mean { value, over }
 }
 
-fn grey(of: &Tensor) -> Result<Tensor, tch::TchError> {
-    of.f_mean_dim([1_i64].as_slice(), true, None)
+fn grey(of: &Tensor) -> Tensor {
+    of.mean_dim([1_i64].as_slice(), true, None)
 }

@@ -84,9 +84,9 @@ impl TrainingTask for DecomposeTask {
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let batch = self.photographs.batch(step)?;
         let output = self.trainable.model.forward(&batch.input)?;
-        let prediction = PredictedTensors::from_outputs(&batch.input, &output)?;
+        let prediction = PredictedTensors::from_outputs(&batch.input, &output);
         Ok(StepLosses {
-            terms: decompose_losses(&batch, &prediction, &self.settings.loss)?,
+            terms: decompose_losses(&batch, &prediction, &self.settings.loss),
             damage: None,
         })
     }
@@ -96,7 +96,7 @@ impl TrainingTask for DecomposeTask {
         let (kind, mut sheet) = (model.precision().kind(), None);
         let figures = self.validation.figures(kind, device, |batch| {
             let prediction =
-                PredictedTensors::from_outputs(&batch.input, &model.forward(&batch.input)?)?;
+                PredictedTensors::from_outputs(&batch.input, &model.forward(&batch.input)?);
             if sheet.is_none() {
                 sheet = Some(validation_sheet(batch, &prediction, SHOWN)?);
             }
@@ -116,36 +116,33 @@ fn figures(
     prediction: &PredictedTensors,
 ) -> Result<Vec<(&'static str, f64)>, TrainError> {
     let mask = &batch.mask;
-    let grey = |of: &Tensor| of.f_mean_dim([1_i64].as_slice(), true, None);
-    let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
-    let quotient = grey(&diffuse)?.f_div(&prediction.shading.f_clamp_min(0.03)?)?;
-    let albedo = grey(&batch.albedo)?;
+    let grey = |of: &Tensor| of.mean_dim([1_i64].as_slice(), true, None);
+    let diffuse = (&batch.picture - &batch.highlight).clamp_min(0.0);
+    let quotient = grey(&diffuse) / prediction.shading.clamp_min(0.03);
+    let albedo = grey(&batch.albedo);
     let window = (mask.size()[2] / 16).max(4);
     let mut figures = highlight_figures(&prediction.highlight, batch)?.to_vec();
     let errors = [
         (
             "shading",
-            scale_invariant(&prediction.shading, &batch.shading, mask)?,
+            scale_invariant(&prediction.shading, &batch.shading, mask),
         ),
-        ("albedo", scale_invariant(&quotient, &albedo, mask)?),
+        ("albedo", scale_invariant(&quotient, &albedo, mask)),
         (
             "shading_windows",
-            windowed(&prediction.shading, &batch.shading, mask, window)?,
+            windowed(&prediction.shading, &batch.shading, mask, window),
         ),
-        (
-            "albedo_windows",
-            windowed(&quotient, &albedo, mask, window)?,
-        ),
+        ("albedo_windows", windowed(&quotient, &albedo, mask, window)),
         (
             "normals_deg",
-            angular_degrees(&prediction.normals, &batch.normals, mask)?,
+            angular_degrees(&prediction.normals, &batch.normals, mask),
         ),
     ];
     for (name, error) in errors {
         figures.push((name, f64::try_from(error)?));
     }
     if let Some(light) = &prediction.light {
-        let distance = relative_distance(light, &batch.light)?.value;
+        let distance = relative_distance(light, &batch.light).value;
         figures.push(("light", f64::try_from(distance)?));
     }
     Ok(figures)

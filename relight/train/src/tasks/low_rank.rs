@@ -11,8 +11,6 @@
 
 use tch::Tensor;
 
-use crate::error::TrainError;
-
 /// How often the Gram matrix is squared: the second eigenvalue counts as its ratio to the first, to
 /// the power 256.
 const SQUARINGS: usize = 8;
@@ -21,65 +19,53 @@ const TINY: f64 = 1e-20;
 
 /// The first left singular vector of each matrix of `groups x N x d`: `groups x N x 1`, without
 /// gradient.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
-    let rows = rows.f_detach()?;
-    let mut power = rows.f_matmul(&rows.f_transpose(1, 2)?)?;
+pub(crate) fn first_singular_vector(rows: &Tensor) -> Tensor {
+    let rows = rows.detach();
+    let mut power = rows.matmul(&rows.transpose(1, 2));
     for squared in 0..=SQUARINGS {
-        let diagonal = power.f_diagonal(0, 1, 2)?;
-        let trace = diagonal.f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
-        let trace = trace.f_clamp_min(TINY)?.f_unsqueeze(2)?;
-        power = power.f_div(&trace)?;
+        let diagonal = power.diagonal(0, 1, 2);
+        let trace = diagonal.sum_dim_intlist([1_i64].as_slice(), true, None);
+        let trace = trace.clamp_min(TINY).unsqueeze(2);
+        power = &power / &trace;
         if squared < SQUARINGS {
-            power = power.f_matmul(&power)?;
+            power = power.matmul(&power);
         }
     }
     // Every column is a multiple of the vector; the longest is the most exact.
-    let longest = power.f_diagonal(0, 1, 2)?.f_argmax(1, false)?;
+    let longest = power.diagonal(0, 1, 2).argmax(1, false);
     let size = power.size();
     let index = longest
-        .f_view([size[0], 1, 1])?
-        .f_expand([size[0], size[1], 1], false)?;
-    let column = power.f_gather(2, &index, false)?;
+        .view([size[0], 1, 1])
+        .expand([size[0], size[1], 1], false);
+    let column = power.gather(2, &index, false);
     let square = column
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
-    Ok(column.f_div(&square.f_clamp_min(TINY)?.f_sqrt()?)?)
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None);
+    &column / square.clamp_min(TINY).sqrt()
 }
 
 /// The best approximation of rank one of each matrix of `groups x N x d`, without gradient.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
-    let vector = first_singular_vector(rows)?;
-    let shares = vector.f_transpose(1, 2)?.f_matmul(&rows.f_detach()?)?;
-    Ok(vector.f_matmul(&shares)?)
+pub(crate) fn rank_one(rows: &Tensor) -> Tensor {
+    let vector = first_singular_vector(rows);
+    let shares = vector.transpose(1, 2).matmul(&rows.detach());
+    vector.matmul(&shares)
 }
 
 /// The loss of each group of `groups x N x d` rows, averaged over the groups.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn low_rank_loss(rows: &Tensor) -> Result<Tensor, TrainError> {
-    let square = rows
-        .f_sub(&rank_one(rows)?)?
-        .f_square()?
-        .f_sum_dim_intlist([1_i64, 2].as_slice(), false, None)?;
-    Ok(square.f_mean(None)?)
+pub(crate) fn low_rank_loss(rows: &Tensor) -> Tensor {
+    let square =
+        (rows - rank_one(rows))
+            .square()
+            .sum_dim_intlist([1_i64, 2].as_slice(), false, None);
+    square.mean(None)
 }
 
 /// Chromaticity (r, g) / (r + g + b) of diffuse pictures, `batch x 3 x height x width` to
 /// `batch x 2 x height x width`: what Spec-Net's low-rank loss looks at, since highlights are whiter
 /// than the object.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn chromaticity(diffuse: &Tensor) -> Result<Tensor, TrainError> {
-    let sum = diffuse.f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
-    Ok(diffuse.f_narrow(1, 0, 2)?.f_div(&sum.f_clamp_min(1e-5)?)?)
+pub(crate) fn chromaticity(diffuse: &Tensor) -> Tensor {
+    let sum = diffuse.sum_dim_intlist([1_i64].as_slice(), true, None);
+    diffuse.narrow(1, 0, 2) / sum.clamp_min(1e-5)
 }
 
 #[cfg(test)]
@@ -94,7 +80,7 @@ mod tests {
     }
 
     fn loss(rows: &Tensor) -> f64 {
-        low_rank_loss(rows).unwrap().double_value(&[])
+        low_rank_loss(rows).double_value(&[])
     }
 
     #[test]
@@ -114,12 +100,12 @@ mod tests {
     #[test]
     fn gradient_descent_below_one_half_reaches_the_approximation_and_above_one_it_does_not() {
         let start = random(&[1, 6, 40]) * 0.3 + random(&[1, 6, 1]).matmul(&random(&[1, 1, 40]));
-        let goal = rank_one(&start).unwrap();
+        let goal = rank_one(&start);
         let descend = |rate: f64| {
             let mut rows = start.copy();
             for _ in 0..200 {
                 let leaf = rows.detach().set_requires_grad(true);
-                low_rank_loss(&leaf).unwrap().backward();
+                low_rank_loss(&leaf).backward();
                 rows = tch::no_grad(|| &leaf - leaf.grad() * rate);
             }
             (&rows - &goal).square().sum(None).double_value(&[])
@@ -140,7 +126,7 @@ mod tests {
             toward in 0.0..1.0_f64,
         ) {
             let rows = Tensor::from_slice(&entries).view([1, 5, 9]);
-            let best = first_singular_vector(&rows).unwrap();
+            let best = first_singular_vector(&rows);
             // Any direction, and directions close to the best one.
             let b = Tensor::from_slice(&direction).view([1, 5, 1]) * (1.0 - toward) + best * toward;
             let square = b.square().sum(None).double_value(&[]);
@@ -168,7 +154,7 @@ mod tests {
     #[test]
     fn a_row_that_is_scaled_keeps_rank_one() {
         let rows = random(&[1, 5, 60]);
-        let approximation = rank_one(&rows).unwrap();
+        let approximation = rank_one(&rows);
         let factors = Tensor::from_slice(&[1.0, 2.0, 0.5, 3.0, 0.1]).view([1, 5, 1]);
         assert!(loss(&(approximation * factors)) < 1e-18);
     }
@@ -176,8 +162,8 @@ mod tests {
     #[test]
     fn its_gradient_is_twice_the_rest() {
         let rows = random(&[1, 4, 30]).set_requires_grad(true);
-        low_rank_loss(&rows).unwrap().backward();
-        let wanted = (rows.detach() - rank_one(&rows).unwrap()) * 2.0;
+        low_rank_loss(&rows).backward();
+        let wanted = (rows.detach() - rank_one(&rows)) * 2.0;
         let worst = (rows.grad() - wanted).abs().max().double_value(&[]);
         assert!(worst < 1e-4, "{worst}");
     }

@@ -3,196 +3,158 @@
 
 use tch::Tensor;
 
-use crate::error::TrainError;
 use relight_core::render::{DiffuseForm, RELEASED_AMBIENT, diffuse_constants, power_constants};
 
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
 
 /// A picture in sRGB, `3` channels of 0..=1, as the paper's networks are fed: `(x - 0.5) / 0.5` inside the mask.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn network_input(srgb: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    Ok(srgb.f_mul_scalar(2.0)?.f_add_scalar(-1.0)?.f_mul(mask)?)
+pub(crate) fn network_input(srgb: &Tensor, mask: &Tensor) -> Tensor {
+    (srgb * 2.0 - 1.0) * mask
 }
 
 /// The sRGB values of linear light, 0..=1.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
-    let light = linear.f_clamp(0.0, 1.0)?;
-    let dark = light.f_mul_scalar(12.92)?;
+pub(crate) fn to_srgb(linear: &Tensor) -> Tensor {
+    let light = linear.clamp(0.0, 1.0);
+    let dark = &light * 12.92;
     // The root's slope at 0 is infinite: there the line is taken, and the root must not be asked.
-    let bright = light
-        .f_clamp_min(0.003)?
-        .f_pow_tensor_scalar(1.0 / 2.4)?
-        .f_mul_scalar(1.055)?
-        .f_add_scalar(-0.055)?;
-    Ok(dark.f_where_self(&light.f_le(0.003_130_8)?, &bright)?)
+    let bright = light.clamp_min(0.003).pow_tensor_scalar(1.0 / 2.4) * 1.055 - 0.055;
+    dark.where_self(&light.le(0.003_130_8), &bright)
 }
 
 /// Normals (p, q, 1) over their length of slopes (p, q), 0 outside the mask. y is as the slopes have it: down in the
 /// paper's figures and in the predictions of Normal-Net.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    let length = slopes
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_add_scalar(1.0)?
-        .f_sqrt()?;
-    let one = slopes.f_narrow(1, 0, 1)?.f_ones_like()?;
-    let vectors = Tensor::f_cat(&[slopes.shallow_clone(), one], 1)?;
-    Ok(vectors.f_div(&length)?.f_mul(mask)?)
+pub(crate) fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Tensor {
+    let length = (slopes
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        + 1.0)
+        .sqrt();
+    let one = slopes.narrow(1, 0, 1).ones_like();
+    let vectors = Tensor::cat(&[slopes.shallow_clone(), one], 1);
+    &vectors / &length * mask
 }
 
 /// The shading of normals (y up) under coefficients, `batch x 9 x 3` (harmonic, colour): `batch x 3 x height x width`.
 ///
 /// The released form takes |L00| and adds 0.1, as [`DiffuseForm::Released`] says.
-///
-/// # Errors
-/// [`TrainError::Torch`].
 pub(crate) fn diffuse_shading(
     normals: &Tensor,
     coefficients: &Tensor,
     form: DiffuseForm,
-) -> Result<Tensor, TrainError> {
+) -> Tensor {
     let coefficients = match form {
         DiffuseForm::Irradiance => coefficients.shallow_clone(),
         DiffuseForm::Released => {
-            let first = coefficients.f_narrow(1, 0, 1)?.f_abs()?;
-            Tensor::f_cat(&[first, coefficients.f_narrow(1, 1, 8)?], 1)?
+            let first = coefficients.narrow(1, 0, 1).abs();
+            Tensor::cat(&[first, coefficients.narrow(1, 1, 8)], 1)
         }
     };
-    let sums = weighted_terms(&diffuse_terms(normals)?, &coefficients)?;
-    let positive = sums.f_clamp_min(0.0)?;
-    Ok(match form {
+    let sums = weighted_terms(&diffuse_terms(normals), &coefficients);
+    let positive = sums.clamp_min(0.0);
+    match form {
         DiffuseForm::Irradiance => positive,
-        DiffuseForm::Released => positive.f_add_scalar(RELEASED_AMBIENT)?,
-    })
+        DiffuseForm::Released => &positive + RELEASED_AMBIENT,
+    }
 }
 
 /// The paper's highlight (5) of normals (y up): s_p times the sum of C_lm (Â_l Ŷ_lm(n))^α, each power with the sign of what
 /// is raised. `reflectance` is `batch x 3`, `smoothness` `batch`.
-///
-/// # Errors
-/// [`TrainError::Torch`].
 pub(crate) fn power_highlight(
     normals: &Tensor,
     coefficients: &Tensor,
     reflectance: &Tensor,
     smoothness: &Tensor,
-) -> Result<Tensor, TrainError> {
-    let terms = power_terms(normals)?;
-    let exponent = smoothness.f_view([-1, 1, 1, 1])?;
-    let powers = terms
-        .f_abs()?
-        .f_clamp_min(TINY)?
-        .f_pow(&exponent)?
-        .f_mul(&terms.f_sign()?)?;
-    let sums = weighted_terms(&powers, coefficients)?;
-    Ok(sums.f_mul(&reflectance.f_view([-1, 3, 1, 1])?)?)
+) -> Tensor {
+    let terms = power_terms(normals);
+    let exponent = smoothness.view([-1, 1, 1, 1]);
+    let powers = terms.abs().clamp_min(TINY).pow(&exponent) * terms.sign();
+    let sums = weighted_terms(&powers, coefficients);
+    &sums * reflectance.view([-1, 3, 1, 1])
 }
 
 /// `batch x 9 x h x w` terms times `batch x 9 x 3` coefficients: `batch x 3 x h x w`.
-fn weighted_terms(terms: &Tensor, coefficients: &Tensor) -> Result<Tensor, TrainError> {
+fn weighted_terms(terms: &Tensor, coefficients: &Tensor) -> Tensor {
     let size = terms.size();
-    let flat = terms.f_view([size[0], 9, size[2] * size[3]])?;
-    let sums = coefficients.f_transpose(1, 2)?.f_matmul(&flat)?;
-    Ok(sums.f_view([size[0], 3, size[2], size[3]])?)
+    let flat = terms.view([size[0], 9, size[2] * size[3]]);
+    let sums = coefficients.transpose(1, 2).matmul(&flat);
+    sums.view([size[0], 3, size[2], size[3]])
 }
 
 /// x, y and z of normals.
-fn components(normals: &Tensor) -> Result<[Tensor; 3], tch::TchError> {
-    Ok([
-        normals.f_narrow(1, 0, 1)?,
-        normals.f_narrow(1, 1, 1)?,
-        normals.f_narrow(1, 2, 1)?,
-    ])
+fn components(normals: &Tensor) -> [Tensor; 3] {
+    [
+        normals.narrow(1, 0, 1),
+        normals.narrow(1, 1, 1),
+        normals.narrow(1, 2, 1),
+    ]
 }
 
 /// Â_l Y_lm of normals, `batch x 9 x h x w`: the quadratic form's terms.
-fn diffuse_terms(normals: &Tensor) -> Result<Tensor, TrainError> {
+fn diffuse_terms(normals: &Tensor) -> Tensor {
     let [c1, c2, c3, c4, c5] = diffuse_constants();
-    let [x, y, z] = components(normals)?;
-    let product = |a: &Tensor, b: &Tensor, c: f64| a.f_mul(b)?.f_mul_scalar(c);
-    Ok(Tensor::f_cat(
+    let [x, y, z] = components(normals);
+    let product = |a: &Tensor, b: &Tensor, c: f64| a * b * c;
+    Tensor::cat(
         &[
-            x.f_zeros_like()?.f_add_scalar(c4)?,
-            y.f_mul_scalar(2.0 * c2)?,
-            z.f_mul_scalar(2.0 * c2)?,
-            x.f_mul_scalar(2.0 * c2)?,
-            product(&x, &y, 2.0 * c1)?,
-            product(&y, &z, 2.0 * c1)?,
-            product(&z, &z, c3)?.f_add_scalar(-c5)?,
-            product(&x, &z, 2.0 * c1)?,
-            x.f_square()?.f_sub(&y.f_square()?)?.f_mul_scalar(c1)?,
+            x.zeros_like() + c4,
+            &y * (2.0 * c2),
+            &z * (2.0 * c2),
+            &x * (2.0 * c2),
+            product(&x, &y, 2.0 * c1),
+            product(&y, &z, 2.0 * c1),
+            product(&z, &z, c3) - c5,
+            product(&x, &z, 2.0 * c1),
+            (x.square() - y.square()) * c1,
         ],
         1,
-    )?)
+    )
 }
 
 /// Â_l Ŷ_lm of normals, `batch x 9 x h x w`: the harmonics at twice the polar angle.
-fn power_terms(normals: &Tensor) -> Result<Tensor, TrainError> {
+fn power_terms(normals: &Tensor) -> Tensor {
     let [c0, c1, c2, c3, c4] = power_constants();
-    let [x, y, z] = components(normals)?;
-    let square = z.f_square()?;
+    let [x, y, z] = components(normals);
+    let square = z.square();
     // 4 z^3 - 2 z.
-    let odd = square.f_mul_scalar(4.0)?.f_add_scalar(-2.0)?.f_mul(&z)?;
-    let product = |a: &Tensor, b: &Tensor, c: f64| a.f_mul(b)?.f_mul_scalar(c);
+    let odd = (&square * 4.0 - 2.0) * &z;
+    let product = |a: &Tensor, b: &Tensor, c: f64| a * b * c;
     // 4 z^4 - 4 z^2 + 1.
-    let even = square
-        .f_square()?
-        .f_sub(&square)?
-        .f_mul_scalar(4.0)?
-        .f_add_scalar(1.0)?;
-    Ok(Tensor::f_cat(
+    let even = (square.square() - &square) * 4.0 + 1.0;
+    Tensor::cat(
         &[
-            x.f_zeros_like()?.f_add_scalar(c0)?,
-            product(&y, &z, 2.0 * c1)?,
-            square.f_mul_scalar(2.0 * c1)?.f_add_scalar(-c1)?,
-            product(&x, &z, 2.0 * c1)?,
-            product(&x.f_mul(&y)?, &square, 4.0 * c2)?,
-            product(&y, &odd, c2)?,
-            even.f_mul_scalar(3.0 * c3)?.f_add_scalar(-c3)?,
-            product(&x, &odd, c2)?,
-            product(&x.f_square()?.f_sub(&y.f_square()?)?, &square, 4.0 * c4)?,
+            x.zeros_like() + c0,
+            product(&y, &z, 2.0 * c1),
+            &square * (2.0 * c1) - c1,
+            product(&x, &z, 2.0 * c1),
+            product(&(&x * &y), &square, 4.0 * c2),
+            product(&y, &odd, c2),
+            &even * (3.0 * c3) - c3,
+            product(&x, &odd, c2),
+            product(&(x.square() - y.square()), &square, 4.0 * c4),
         ],
         1,
-    )?)
+    )
 }
 
 /// Light-Net's output, `batch x 12`, as coefficients for each colour, `batch x 9 x 3`: nine of length 1, times the
 /// light's colour.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn predicted_light(output: &Tensor) -> Result<Tensor, TrainError> {
-    let nine = output.f_narrow(1, 0, 9)?;
+pub(crate) fn predicted_light(output: &Tensor) -> Tensor {
+    let nine = output.narrow(1, 0, 9);
     let length = nine
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_clamp_min(TINY)?
-        .f_sqrt()?;
-    let nine = nine.f_div(&length)?.f_unsqueeze(2)?;
-    Ok(nine.f_matmul(&output.f_narrow(1, 9, 3)?.f_unsqueeze(1)?)?)
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        .clamp_min(TINY)
+        .sqrt();
+    let nine = (&nine / &length).unsqueeze(2);
+    nine.matmul(&output.narrow(1, 9, 3).unsqueeze(1))
 }
 
 /// The reflectance net's output, `batch x 4`, as s_p (`batch x 3`, above 0) and α (`batch`, 1 to 201).
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn predicted_gloss(output: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
-    let reflectance = output.f_narrow(1, 0, 3)?.f_softplus()?;
-    let smoothness = output
-        .f_select(1, 3)?
-        .f_sigmoid()?
-        .f_mul_scalar(200.0)?
-        .f_add_scalar(1.0)?;
-    Ok((reflectance, smoothness))
+pub(crate) fn predicted_gloss(output: &Tensor) -> (Tensor, Tensor) {
+    let reflectance = output.narrow(1, 0, 3).softplus();
+    let smoothness = output.select(1, 3).sigmoid() * 200.0 + 1.0;
+    (reflectance, smoothness)
 }
 
 #[cfg(test)]
@@ -244,7 +206,7 @@ mod tests {
         let light = some_light();
         for form in [DiffuseForm::Irradiance, DiffuseForm::Released] {
             let plain = DiffuseLayer::new(&light, form).shading(&normals);
-            let ours = diffuse_shading(&tensor, &coefficients(&light), form).unwrap() * &mask;
+            let ours = diffuse_shading(&tensor, &coefficients(&light), form) * &mask;
             let error = largest_difference(&ours, plain.planes().planes());
             assert!(error < 1e-5, "{form:?}: {error}");
         }
@@ -274,7 +236,7 @@ mod tests {
     fn light_of_length_one_has_the_colour_that_was_answered() {
         tch::manual_seed(2);
         let output = Tensor::rand([3, 12], (Kind::Float, Device::Cpu)) - 0.3;
-        let light = predicted_light(&output).unwrap();
+        let light = predicted_light(&output);
         let lengths = light
             .square()
             .sum_dim_intlist([1_i64].as_slice(), false, None::<Kind>)
@@ -286,7 +248,7 @@ mod tests {
     #[test]
     fn srgb_has_a_slope_everywhere() {
         let light = Tensor::from_slice(&[0.0_f32, 0.001, 0.3, 1.0]).set_requires_grad(true);
-        to_srgb(&light).unwrap().sum(None::<Kind>).backward();
+        to_srgb(&light).sum(None::<Kind>).backward();
         let slopes = Vec::<f32>::try_from(light.grad()).unwrap();
         assert!(slopes.iter().all(|slope| slope.is_finite()), "{slopes:?}");
     }

@@ -143,12 +143,12 @@ impl PhaseNetworks {
         Ok(match self {
             Self::Spec => {
                 let highlight = highlight_of(own, picture, mask)?;
-                let grey = highlight.f_mean_dim([1_i64].as_slice(), true, None)?;
+                let grey = highlight.mean_dim([1_i64].as_slice(), true, None);
                 highlight_figures(&grey, batch)?.to_vec()
             }
             Self::Normal | Self::Joint { .. } => {
-                let normals = normals_of(own, &diffuse_of_truth(batch)?, mask)?;
-                let degrees = angular_degrees(&normals, &batch.normals, mask)?;
+                let normals = normals_of(own, &diffuse_of_truth(batch), mask)?;
+                let degrees = angular_degrees(&normals, &batch.normals, mask);
                 vec![("normals_deg", f64::try_from(degrees)?)]
             }
             Self::Light { .. } => {
@@ -174,11 +174,11 @@ impl PhaseNetworks {
         };
         let (raw, found, mask) = match self {
             Self::Spec => {
-                let Some((picture, mask)) = saturated_frames(turns)? else {
+                let Some((picture, mask)) = saturated_frames(turns) else {
                     return Ok(Vec::new());
                 };
                 let found = diffuse_chromaticity(own, &picture, &mask)?;
-                (chromaticity(&picture)?, found, mask)
+                (chromaticity(&picture), found, mask)
             }
             Self::Light { normal, spec } => whole(reflectance(normal, own, spec.as_ref(), turns)?),
             Self::Joint { light, spec } => whole(reflectance(own, light, spec.as_ref(), turns)?),

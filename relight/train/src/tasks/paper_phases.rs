@@ -42,9 +42,9 @@ pub(crate) fn highlight_of(
     picture: &Tensor,
     mask: &Tensor,
 ) -> Result<Tensor, TrainError> {
-    let output = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
-    let highlight = output.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
-    Ok(highlight.f_clamp(0.0, 1.0)?.f_mul(mask)?)
+    let output = &spec.forward(&network_input(&to_srgb(picture), mask))?[0];
+    let highlight = (output + 1.0) * 0.5;
+    Ok(highlight.clamp(0.0, 1.0) * mask)
 }
 
 /// Normal-Net's normals, y up. The network itself has y down, as the paper does.
@@ -56,9 +56,9 @@ pub(crate) fn normals_of(
     picture: &Tensor,
     mask: &Tensor,
 ) -> Result<Tensor, TrainError> {
-    let slopes = &normal.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
-    let (p, q) = (slopes.f_narrow(1, 0, 1)?, slopes.f_narrow(1, 1, 1)?);
-    normals_of_slopes(&Tensor::f_cat(&[p, q.f_neg()?], 1)?, mask)
+    let slopes = &normal.forward(&network_input(&to_srgb(picture), mask))?[0];
+    let (p, q) = (slopes.narrow(1, 0, 1), slopes.narrow(1, 1, 1));
+    Ok(normals_of_slopes(&Tensor::cat(&[p, -q], 1), mask))
 }
 
 /// Light-Net's coefficients, `frames x 9 x 3`.
@@ -70,56 +70,47 @@ pub(crate) fn light_of(
     picture: &Tensor,
     mask: &Tensor,
 ) -> Result<Tensor, TrainError> {
-    predicted_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
+    let output = &light.forward(&network_input(&to_srgb(picture), mask))?[0];
+    Ok(predicted_light(output))
 }
 
 /// Rows of one turn's frames under their mask, for the low-rank loss: `1 x frames x values`, brought to a mean length of 1
 /// so that a dark turn counts as much as a bright one.
-fn rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    let rows = of.f_mul(mask)?.f_flatten(1, -1)?;
+fn rows(of: &Tensor, mask: &Tensor) -> Tensor {
+    let rows = (of * mask).flatten(1, -1);
     let frames = rows.size()[0] as f64;
-    let length = rows.f_detach()?.f_square()?.f_sum(None)?;
-    let scale = length.f_div_scalar(frames)?.f_clamp_min(TINY)?.f_sqrt()?;
-    Ok(rows.f_div(&scale)?.f_unsqueeze(0)?)
+    let length = rows.detach().square().sum(None);
+    let scale = (&length / frames).clamp_min(TINY).sqrt();
+    (&rows / &scale).unsqueeze(0)
 }
 
 /// The same, each row brought to the length 1.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn equal_rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    let rows = of.f_mul(mask)?.f_flatten(1, -1)?;
+pub(crate) fn equal_rows(of: &Tensor, mask: &Tensor) -> Tensor {
+    let rows = (of * mask).flatten(1, -1);
     let square = rows
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
-    Ok(rows
-        .f_div(&square.f_clamp_min(TINY)?.f_sqrt()?)?
-        .f_unsqueeze(0)?)
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None);
+    (&rows / square.clamp_min(TINY).sqrt()).unsqueeze(0)
 }
 
-fn low_rank(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    low_rank_loss(&rows(of, mask)?)
+fn low_rank(of: &Tensor, mask: &Tensor) -> Tensor {
+    low_rank_loss(&rows(of, mask))
 }
 
 /// The frames for which the gate of saturation opens Spec-Net, and their masks; `None` if they are fewer than two.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub(crate) fn saturated_frames(
-    turns: &TurnTensors,
-) -> Result<Option<(Tensor, Tensor)>, TrainError> {
+pub(crate) fn saturated_frames(turns: &TurnTensors) -> Option<(Tensor, Tensor)> {
     let open: Vec<i64> = (0_i64..)
         .zip(&turns.spec_net)
         .filter_map(|(at, &is_open)| is_open.then_some(at))
         .collect();
     if open.len() < 2 {
-        return Ok(None);
+        return None;
     }
-    let index = Tensor::f_from_slice(&open)?.f_to_device(turns.picture.device())?;
-    Ok(Some((
-        turns.picture.f_index_select(0, &index)?,
-        turns.mask.f_index_select(0, &index)?,
-    )))
+    let index = Tensor::from_slice(&open).to_device(turns.picture.device());
+    Some((
+        turns.picture.index_select(0, &index),
+        turns.mask.index_select(0, &index),
+    ))
 }
 
 /// The chromaticity that is left of pictures when Spec-Net's highlight is taken off.
@@ -132,7 +123,7 @@ pub(crate) fn diffuse_chromaticity(
     mask: &Tensor,
 ) -> Result<Tensor, TrainError> {
     let highlight = highlight_of(spec, picture, mask)?;
-    chromaticity(&picture.f_sub(&highlight)?.f_clamp(DARKEST, 1.0)?)
+    Ok(chromaticity(&(picture - &highlight).clamp(DARKEST, 1.0)))
 }
 
 /// Low-rank loss of the chromaticity that Spec-Net's diffuse pictures have; `None` if the gate opens for fewer than
@@ -144,10 +135,11 @@ pub(crate) fn spec_on_turns(
     spec: &Model,
     turns: &TurnTensors,
 ) -> Result<Option<Tensor>, TrainError> {
-    let Some((picture, mask)) = saturated_frames(turns)? else {
+    let Some((picture, mask)) = saturated_frames(turns) else {
         return Ok(None);
     };
-    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask).map(Some)
+    let diffuse = diffuse_chromaticity(spec, &picture, &mask)?;
+    Ok(Some(low_rank(&diffuse, &mask)))
 }
 
 /// Mean error of Spec-Net's highlight on synthetic samples; highlights count more than their absence.
@@ -156,15 +148,12 @@ pub(crate) fn spec_on_turns(
 /// [`TrainError::Torch`].
 pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
-    let truth = batch.highlight.f_clamp(0.0, 1.0)?;
-    let emphasis = truth
-        .f_clamp(0.0, FULL_HIGHLIGHT)?
-        .f_mul_scalar(HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT)?
-        .f_add_scalar(1.0)?
-        .f_mul(&batch.mask)?;
-    let error = found.f_sub(&truth)?.f_abs()?.f_mul(&emphasis)?;
-    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
-    let value = error.f_sum(None)?.f_div(&over)?.f_mul_scalar(1.0 / 3.0)?;
+    let truth = batch.highlight.clamp(0.0, 1.0);
+    let emphasis = (truth.clamp(0.0, FULL_HIGHLIGHT) * (HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT) + 1.0)
+        * &batch.mask;
+    let error = (&found - &truth).abs() * &emphasis;
+    let over = batch.mask.sum(None).clamp_min(1.0);
+    let value = error.sum(None) / &over * (1.0 / 3.0);
     Ok(Mean { value, over })
 }
 
@@ -173,8 +162,8 @@ pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Mean, Tr
 /// # Errors
 /// [`TrainError::Torch`].
 pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
-    let found = normals_of(normal, &diffuse_of_truth(batch)?, &batch.mask)?;
-    angular(&found, &batch.normals, &batch.mask)
+    let found = normals_of(normal, &diffuse_of_truth(batch), &batch.mask)?;
+    Ok(angular(&found, &batch.normals, &batch.mask))
 }
 
 /// Scale-invariant error of the shading by Light-Net's light on the true normals of synthetic samples.
@@ -182,11 +171,11 @@ pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean
 /// # Errors
 /// [`TrainError::Torch`].
 pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
-    let coefficients = light_of(light, &diffuse_of_truth(batch)?, &batch.mask)?;
-    let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
-    let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
-    let value = scale_invariant(&grey, &batch.shading, &batch.mask)?;
-    let over = Tensor::f_from_slice(&[batch.mask.size()[0]])?;
+    let coefficients = light_of(light, &diffuse_of_truth(batch), &batch.mask)?;
+    let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released);
+    let grey = shading.mean_dim([1_i64].as_slice(), true, None);
+    let value = scale_invariant(&grey, &batch.shading, &batch.mask);
+    let over = Tensor::from_slice(&[batch.mask.size()[0]]);
     Ok(Mean { value, over })
 }
 
@@ -200,7 +189,8 @@ pub(crate) fn reflectance_on_turns(
     spec: Option<&Model>,
     turns: &TurnTensors,
 ) -> Result<Tensor, TrainError> {
-    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask)
+    let reflectance = reflectance(normal, light, spec, turns)?;
+    Ok(low_rank(&reflectance, &turns.mask))
 }
 
 /// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light.
@@ -215,38 +205,34 @@ pub(crate) fn reflectance(
 ) -> Result<Tensor, TrainError> {
     let mask = &turns.mask;
     let diffuse = match spec {
-        Some(spec) => without_highlight(turns, &highlight_of(spec, &turns.picture, mask)?)?,
+        Some(spec) => without_highlight(turns, &highlight_of(spec, &turns.picture, mask)?),
         None => turns.picture.shallow_clone(),
     };
     let normals = normals_of(normal, &diffuse, mask)?;
     let coefficients = light_of(light, &diffuse, mask)?;
-    let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released)?;
-    Ok(diffuse
-        .f_div(&shading.f_clamp_min(MIN_SHADING)?)?
-        .f_clamp(0.0, 1.0)?)
+    let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released);
+    Ok((&diffuse / shading.clamp_min(MIN_SHADING)).clamp(0.0, 1.0))
 }
 
 /// The pictures without Spec-Net's highlights, where the gate is open for them: what Normal-Net and Light-Net are given.
-fn without_highlight(turns: &TurnTensors, highlight: &Tensor) -> Result<Tensor, TrainError> {
-    let removed = highlight.f_mul(&gate(turns)?)?;
-    Ok(turns.picture.f_sub(&removed)?.f_clamp(0.0, 1.0)?)
+fn without_highlight(turns: &TurnTensors, highlight: &Tensor) -> Tensor {
+    let removed = highlight * gate(turns);
+    (&turns.picture - &removed).clamp(0.0, 1.0)
 }
 
 /// The same of synthetic samples, whose highlights are known.
-pub(crate) fn diffuse_of_truth(batch: &TruthBatch) -> Result<Tensor, TrainError> {
-    Ok(batch.picture.f_sub(&batch.highlight)?.f_clamp(0.0, 1.0)?)
+pub(crate) fn diffuse_of_truth(batch: &TruthBatch) -> Tensor {
+    (&batch.picture - &batch.highlight).clamp(0.0, 1.0)
 }
 
 /// 1 for the frames for which the gate of saturation opens Spec-Net, 0 for the others: `frames x 1 x 1 x 1`.
-fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
+fn gate(turns: &TurnTensors) -> Tensor {
     let open = turns
         .spec_net
         .iter()
         .map(|&is_open| f32::from(u8::from(is_open)));
-    let open = Tensor::f_from_slice(&open.collect::<Vec<_>>())?;
-    Ok(open
-        .f_to_device(turns.picture.device())?
-        .f_view([-1, 1, 1, 1])?)
+    let open = Tensor::from_slice(&open.collect::<Vec<_>>());
+    open.to_device(turns.picture.device()).view([-1, 1, 1, 1])
 }
 
 /// Mean squared difference between Spec-Net's highlight and the one that the predicted reflectance and smoothness
@@ -264,18 +250,17 @@ pub(crate) fn specular_on_turns(
     }
     let (picture, mask) = (&turns.picture, &turns.mask);
     let highlight = highlight_of(spec, picture, mask)?;
-    let diffuse = without_highlight(turns, &highlight)?;
+    let diffuse = without_highlight(turns, &highlight);
     let normals = normals_of(normal, &diffuse, mask)?;
     let coefficients = light_of(light, &diffuse, mask)?;
-    let output = &reflectance.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
-    let (strength, smoothness) = predicted_gloss(output)?;
-    let rendered = power_highlight(&normals, &coefficients, &strength, &smoothness)?
-        .f_clamp(0.0, 1.0)?
-        .f_mul(mask)?;
-    let weight = gate(turns)?.f_mul(mask)?;
-    let error = rendered.f_sub(&highlight)?.f_square()?.f_mul(&weight)?;
-    let pixels = weight.f_sum(None)?.f_mul_scalar(3.0)?.f_clamp_min(1.0)?;
-    Ok(Some(error.f_sum(None)?.f_div(&pixels)?))
+    let output = &reflectance.forward(&network_input(&to_srgb(picture), mask))?[0];
+    let (strength, smoothness) = predicted_gloss(output);
+    let rendered =
+        power_highlight(&normals, &coefficients, &strength, &smoothness).clamp(0.0, 1.0) * mask;
+    let weight = gate(turns) * mask;
+    let error = (&rendered - &highlight).square() * &weight;
+    let pixels = (weight.sum(None) * 3.0).clamp_min(1.0);
+    Ok(Some(error.sum(None) / &pixels))
 }
 
 #[cfg(test)]
@@ -368,7 +353,7 @@ mod tests {
             })
             .collect();
         let light = Tensor::from_slice(&light).view([frames, 9, 3]);
-        let shading = diffuse_shading(&normals, &light, DiffuseForm::Released).unwrap();
+        let shading = diffuse_shading(&normals, &light, DiffuseForm::Released);
         let albedo = (x * 7.0)
             .sin()
             .f_mul_scalar(0.25)
@@ -381,7 +366,7 @@ mod tests {
             let reflectance = picture / &shading;
             super::super::validation::rank_residual(&reflectance, &mask).unwrap()
         };
-        let (linear, file) = (residual(&picture), residual(&to_srgb(&picture).unwrap()));
+        let (linear, file) = (residual(&picture), residual(&to_srgb(&picture)));
         assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");
     }
 

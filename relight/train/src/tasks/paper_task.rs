@@ -123,8 +123,8 @@ impl PaperTask {
         if values.is_empty() {
             losses.terms.add_nothing("turns", coefficient);
         } else {
-            let over = Tensor::f_from_slice(&[values.len() as i64])?;
-            let value = Tensor::f_stack(&values, 0)?.f_mean(None)?;
+            let over = Tensor::from_slice(&[values.len() as i64]);
+            let value = Tensor::stack(&values, 0).mean(None);
             losses
                 .terms
                 .add_mean("turns", coefficient, Mean { value, over });

@@ -6,7 +6,6 @@
 use tch::Tensor;
 
 use crate::engine::losses::Mean;
-use crate::error::TrainError;
 
 /// Keeps logarithms of dark values finite.
 const FLOOR: f64 = 0.02;
@@ -26,44 +25,34 @@ pub(crate) struct ShadowVsPaint {
 
 impl ShadowVsPaint {
     /// That of albedo under a shading.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(crate) fn new(
-        albedo: &Tensor,
-        shading: &Tensor,
-        mask: &Tensor,
-    ) -> Result<Self, TrainError> {
-        let grey = albedo.f_mean_dim([1_i64].as_slice(), true, None)?;
-        let (paint, shadow) = (darkness(&grey, mask)?, darkness(shading, mask)?);
-        let sum = paint.f_add(&shadow)?;
-        Ok(Self {
-            paint: paint.f_div(&sum.f_add_scalar(1e-4)?)?,
-            weight: sum.f_clamp_max(MAX_DARKNESS)?.f_mul(mask)?,
-        })
+    pub(crate) fn new(albedo: &Tensor, shading: &Tensor, mask: &Tensor) -> Self {
+        let grey = albedo.mean_dim([1_i64].as_slice(), true, None);
+        let (paint, shadow) = (darkness(&grey, mask), darkness(shading, mask));
+        let sum = &paint + &shadow;
+        Self {
+            paint: &paint / (&sum + 1e-4),
+            weight: sum.clamp_max(MAX_DARKNESS) * mask,
+        }
     }
 
     /// The cross entropy of a prediction, a logit.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(crate) fn cross_entropy(&self, logit: &Tensor) -> Result<Mean, TrainError> {
+    pub(crate) fn cross_entropy(&self, logit: &Tensor) -> Mean {
         // softplus(x) - p x is the cross entropy of the probability p and the logit x.
-        let entropy = logit.f_softplus()?.f_sub(&self.paint.f_mul(logit)?)?;
-        let over = self.weight.f_sum(None)?.f_clamp_min(1.0)?;
-        let value = entropy.f_mul(&self.weight)?.f_sum(None)?.f_div(&over)?;
-        Ok(Mean { value, over })
+        let entropy = logit.softplus() - &self.paint * logit;
+        let over = self.weight.sum(None).clamp_min(1.0);
+        let value = (&entropy * &self.weight).sum(None) / &over;
+        Mean { value, over }
     }
 }
 
 /// By how much values are darker than the brightest place, as a logarithm, 0 and above.
-fn darkness(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    let inside = of.f_mul(mask)?;
+fn darkness(of: &Tensor, mask: &Tensor) -> Tensor {
+    let inside = of * mask;
     let half = AROUND / 2;
-    let around = inside.f_avg_pool2d([AROUND; 2], [1; 2], [half; 2], false, true, None)?;
-    let brightest = around.f_amax([1_i64, 2, 3], true)?;
-    let log = |of: &Tensor| of.f_add_scalar(FLOOR)?.f_log();
-    Ok(log(&brightest)?.f_sub(&log(of)?)?.f_clamp_min(0.0)?)
+    let around = inside.avg_pool2d([AROUND; 2], [1; 2], [half; 2], false, true, None);
+    let brightest = around.amax([1_i64, 2, 3], true);
+    let log = |of: &Tensor| (of + FLOOR).log();
+    (log(&brightest) - log(of)).clamp_min(0.0)
 }
 
 #[cfg(test)]
@@ -85,12 +74,12 @@ mod tests {
     #[test]
     fn black_print_in_even_light_is_paint_and_a_shadow_on_even_paint_is_not() {
         let mask = halves(1.0, 1.0, 1);
-        let print = ShadowVsPaint::new(&halves(0.8, 0.05, 3), &halves(1.0, 1.0, 1), &mask).unwrap();
+        let print = ShadowVsPaint::new(&halves(0.8, 0.05, 3), &halves(1.0, 1.0, 1), &mask);
         assert!(at(&print.paint, 13) > 0.99 && at(&print.weight, 13) > 1.0);
         assert!(at(&print.weight, 3) < 0.01);
-        let shadow = ShadowVsPaint::new(&halves(0.8, 0.8, 3), &halves(1.5, 0.1, 1), &mask).unwrap();
+        let shadow = ShadowVsPaint::new(&halves(0.8, 0.8, 3), &halves(1.5, 0.1, 1), &mask);
         assert!(at(&shadow.paint, 13) < 0.01 && at(&shadow.weight, 13) > 1.0);
-        let both = ShadowVsPaint::new(&halves(0.8, 0.2, 3), &halves(1.6, 0.4, 1), &mask).unwrap();
+        let both = ShadowVsPaint::new(&halves(0.8, 0.2, 3), &halves(1.6, 0.4, 1), &mask);
         assert!((at(&both.paint, 13) - 0.5).abs() < 0.05);
     }
 
@@ -102,10 +91,10 @@ mod tests {
             Tensor::ones_like(&albedo).narrow(1, 0, 1),
             mask.repeat([1, 1, 2, 1]),
         );
-        let truth = ShadowVsPaint::new(&albedo, &shading, &mask).unwrap();
+        let truth = ShadowVsPaint::new(&albedo, &shading, &mask);
         let cost = |left: f64, right: f64| {
             let logit = halves(left, right, 1).repeat([1, 1, 2, 1]);
-            truth.cross_entropy(&logit).unwrap().value.double_value(&[])
+            truth.cross_entropy(&logit).value.double_value(&[])
         };
         assert!(cost(5.0, 0.0) < 0.02 && cost(-5.0, 0.0) > 3.0);
         assert_eq!(cost(5.0, 0.0), cost(5.0, -9.0));

@@ -75,60 +75,48 @@ impl TurnNetworkTask {
 }
 
 /// Unit normals, and the logarithm of their expected chord error.
-fn predicted_normals(output: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
-    let normals = output.f_narrow(1, 0, 3)?;
-    let length = normals
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_add_scalar(1e-8)?
-        .f_sqrt()?;
-    let log_chord = output
-        .f_narrow(1, 3, 1)?
-        .f_clamp(LOG_CHORD.0, LOG_CHORD.1)?;
-    Ok((normals.f_div(&length)?, log_chord))
+fn predicted_normals(output: &Tensor) -> (Tensor, Tensor) {
+    let normals = output.narrow(1, 0, 3);
+    let length = (normals
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        + 1e-8)
+        .sqrt();
+    let log_chord = output.narrow(1, 3, 1).clamp(LOG_CHORD.0, LOG_CHORD.1);
+    (&normals / &length, log_chord)
 }
 
 /// How far the logarithm of the albedo is off at each pixel and channel, 0 outside the masks. Each channel of a turn is in a
 /// unit of its own, in which its mean error is 0.
-fn albedo_errors(output: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
-    let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
-    let errors = output
-        .f_add(&means)?
-        .f_sub(&batch.log_albedo)?
-        .f_mul(&batch.mask)?;
-    let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
-    let covered = over(&batch.mask)?.f_clamp_min(1.0)?;
-    let units = over(&errors)?.f_div(&covered)?;
-    Ok(errors.f_sub(&units)?.f_mul(&batch.mask)?)
+fn albedo_errors(output: &Tensor, batch: &TurnBatch) -> Tensor {
+    let means = batch.input.narrow(1, LOG_MEANS as i64, 3);
+    let errors = (output + &means - &batch.log_albedo) * &batch.mask;
+    let over = |of: &Tensor| of.sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+    let covered = over(&batch.mask).clamp_min(1.0);
+    let units = over(&errors) / &covered;
+    (&errors - &units) * &batch.mask
 }
 
 /// The mean amount of these errors.
-fn albedo_error(errors: &Tensor, batch: &TurnBatch) -> Result<Mean, TrainError> {
+fn albedo_error(errors: &Tensor, batch: &TurnBatch) -> Mean {
     let channels = errors.size()[1] as f64;
-    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
-    let sum = errors.f_abs()?.f_sum(None)?;
-    let value = sum.f_div(&over)?.f_div_scalar(channels)?;
-    Ok(Mean { value, over })
+    let over = batch.mask.sum(None).clamp_min(1.0);
+    let sum = errors.abs().sum(None);
+    let value = &sum / &over / channels;
+    Mean { value, over }
 }
 
 /// Minus the logarithm of the chord's likelihood, where it is distributed exponentially with the expected mean.
-fn expected_error(
-    normals: &Tensor,
-    log_chord: &Tensor,
-    batch: &TurnBatch,
-) -> Result<Mean, TrainError> {
-    let found = normals.f_detach()?;
-    let chord = found
-        .f_sub(&batch.normals)?
-        .f_square()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_sqrt()?;
-    let each = chord
-        .f_mul(&log_chord.f_neg()?.f_exp()?)?
-        .f_add(log_chord)?;
-    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
-    let value = each.f_mul(&batch.mask)?.f_sum(None)?.f_div(&over)?;
-    Ok(Mean { value, over })
+fn expected_error(normals: &Tensor, log_chord: &Tensor, batch: &TurnBatch) -> Mean {
+    let found = normals.detach();
+    let chord = (&found - &batch.normals)
+        .square()
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        .sqrt();
+    let each = &chord * (-log_chord).exp() + log_chord;
+    let over = batch.mask.sum(None).clamp_min(1.0);
+    let value = (&each * &batch.mask).sum(None) / &over;
+    Mean { value, over }
 }
 
 impl TrainingTask for TurnNetworkTask {
@@ -163,16 +151,12 @@ impl TrainingTask for TurnNetworkTask {
         let seed = stream(stream(run.seed, 43), step);
         let batch = self.training.batch(data.views_at(step), run.batch, seed)?;
         let output = self.trainable.model.forward(&batch.input)?;
-        let (normals, log_chord) = predicted_normals(&output[0])?;
+        let (normals, log_chord) = predicted_normals(&output[0]);
         let mut terms = LossTerms::default();
-        terms.add_mean(
-            "normals",
-            1.0,
-            chord(&normals, &batch.normals, &batch.mask)?,
-        );
-        let expected = expected_error(&normals, &log_chord, &batch)?;
+        terms.add_mean("normals", 1.0, chord(&normals, &batch.normals, &batch.mask));
+        let expected = expected_error(&normals, &log_chord, &batch);
         terms.add_mean("expected_error", EXPECTED_ERROR, expected);
-        let albedo = albedo_error(&albedo_errors(&output[1], &batch)?, &batch)?;
+        let albedo = albedo_error(&albedo_errors(&output[1], &batch), &batch);
         terms.add_mean("albedo", ALBEDO, albedo);
         Ok(StepLosses {
             terms,
@@ -187,7 +171,7 @@ impl TrainingTask for TurnNetworkTask {
         for batch in &self.validated {
             no_grad(|| {
                 let output = model.forward(&batch.input)?;
-                let (normals, log_chord) = predicted_normals(&output[0])?;
+                let (normals, log_chord) = predicted_normals(&output[0]);
                 summary.add(batch, &normals, &log_chord)?;
                 summary.add_albedo(batch, &output[1])
             })?;
@@ -218,25 +202,17 @@ impl ValidationSummary {
         log_chord: &Tensor,
     ) -> Result<(), TrainError> {
         for k in 0..batch.mask.size()[0] {
-            let part = |of: &Tensor| of.f_narrow(0, k, 1);
-            let mask = part(&batch.mask)?;
-            let error = angular_degrees(&part(normals)?, &part(&batch.normals)?, &mask)?;
+            let part = |of: &Tensor| of.narrow(0, k, 1);
+            let mask = part(&batch.mask);
+            let error = angular_degrees(&part(normals), &part(&batch.normals), &mask);
             self.means.push(f64::try_from(error)?);
-            let inside = mask.f_gt(0.5)?;
-            let dots = part(normals)?
-                .f_mul(&part(&batch.normals)?)?
-                .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-                .f_clamp(-1.0, 1.0)?;
-            let errors = dots.f_acos()?.f_rad2deg()?.f_masked_select(&inside)?;
-            let chords = part(log_chord)?
-                .f_exp()?
-                .f_mul_scalar(0.5)?
-                .f_clamp_max(1.0)?;
-            let expected = chords
-                .f_asin()?
-                .f_rad2deg()?
-                .f_mul_scalar(2.0)?
-                .f_masked_select(&inside)?;
+            let inside = mask.gt(0.5);
+            let dots = (part(normals) * part(&batch.normals))
+                .sum_dim_intlist([1_i64].as_slice(), true, None)
+                .clamp(-1.0, 1.0);
+            let errors = dots.acos().rad2deg().masked_select(&inside);
+            let chords = (part(log_chord).exp() * 0.5).clamp_max(1.0);
+            let expected = (chords.asin().rad2deg() * 2.0).masked_select(&inside);
             let (errors, expected) = (
                 Vec::<f32>::try_from(errors)?,
                 Vec::<f32>::try_from(expected)?,
@@ -247,17 +223,17 @@ impl ValidationSummary {
     }
 
     fn add_albedo(&mut self, batch: &TurnBatch, output: &Tensor) -> Result<(), TrainError> {
-        let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
-        let within = |of: &Tensor| of.f_exp()?.f_mul(&batch.mask);
-        let (found, right) = (within(&output.f_add(&means)?)?, within(&batch.log_albedo)?);
-        let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
-        let square = over(&found.f_square()?)?.f_clamp_min(1e-12)?;
-        let unit = over(&found.f_mul(&right)?)?.f_div(&square)?;
-        let apart = found.f_mul(&unit)?.f_sub(&right)?.f_square()?;
-        let all = |of: &Tensor| of.f_sum_dim_intlist([1_i64, 2, 3].as_slice(), false, None);
-        let error = all(&apart)?.f_div(&all(&right.f_square()?)?.f_clamp_min(1e-12)?)?;
+        let means = batch.input.narrow(1, LOG_MEANS as i64, 3);
+        let within = |of: &Tensor| of.exp() * &batch.mask;
+        let (found, right) = (within(&(output + &means)), within(&batch.log_albedo));
+        let over = |of: &Tensor| of.sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+        let square = over(&found.square()).clamp_min(1e-12);
+        let unit = over(&(&found * &right)) / &square;
+        let apart = (&found * &unit - &right).square();
+        let all = |of: &Tensor| of.sum_dim_intlist([1_i64, 2, 3].as_slice(), false, None);
+        let error = all(&apart) / all(&right.square()).clamp_min(1e-12);
         self.albedo
-            .extend(Vec::<f64>::try_from(error.f_to_kind(Kind::Double)?)?);
+            .extend(Vec::<f64>::try_from(error.to_kind(Kind::Double))?);
         Ok(())
     }
 

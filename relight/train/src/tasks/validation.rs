@@ -135,7 +135,7 @@ impl ValidationSamples {
         let mut sums = Figures::new();
         for samples in self.samples().chunks(SAMPLE_BATCH) {
             let share = samples.len() as f64 / self.samples().len() as f64;
-            let batch = TruthBatch::new(samples, kind, device)?;
+            let batch = TruthBatch::new(samples, kind, device);
             for (name, value) in no_grad(|| of(&batch))? {
                 *sums.entry(name.to_owned()).or_default() += share * value;
             }
@@ -152,10 +152,10 @@ fn unit(hash: u64) -> f64 {
 /// How far pictures of one reflectance, `frames x channels x height x width`, are from being multiples of one: the
 /// part of their energy that the best matrix of rank one leaves. Frames are brought to one length first.
 pub(crate) fn rank_residual(of: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
-    let rows = equal_rows(of, mask)?;
-    let energy = |of: &Tensor| of.f_square()?.f_sum(Kind::Double);
-    let rest = energy(&rows.f_sub(&rank_one(&rows)?)?)?;
-    let residual = rest.f_div(&energy(&rows)?.f_clamp_min(1e-12)?)?;
+    let rows = equal_rows(of, mask);
+    let energy = |of: &Tensor| of.square().sum(Kind::Double);
+    let rest = energy(&(&rows - rank_one(&rows)));
+    let residual = &rest / energy(&rows).clamp_min(1e-12);
     Ok(f64::try_from(residual)?)
 }
 
@@ -166,15 +166,15 @@ pub(crate) fn highlight_figures(
     batch: &TruthBatch,
 ) -> Result<[(&'static str, f64); 3], TrainError> {
     let (truth, mask) = (&batch.highlight, &batch.mask);
-    let energy = |of: &Tensor| f64::try_from(of.f_mul(mask)?.f_square()?.f_sum(Kind::Double)?);
-    let seen = |of: &Tensor| of.f_mul(mask)?.f_gt(SEEN_HIGHLIGHT);
-    let (found_there, truly_there) = (seen(found)?, seen(truth)?);
-    let count = |of: &Tensor| f64::try_from(of.f_sum(Kind::Double)?);
-    let right = count(&found_there.f_logical_and(&truly_there)?)?;
+    let energy = |of: &Tensor| f64::try_from((of * mask).square().sum(Kind::Double));
+    let seen = |of: &Tensor| (of * mask).gt(SEEN_HIGHLIGHT);
+    let (found_there, truly_there) = (seen(found), seen(truth));
+    let count = |of: &Tensor| f64::try_from(of.sum(Kind::Double));
+    let right = count(&found_there.logical_and(&truly_there))?;
     Ok([
         (
             "highlight",
-            energy(&found.f_sub(truth)?)? / energy(truth)?.max(1e-9),
+            energy(&(found - truth))? / energy(truth)?.max(1e-9),
         ),
         ("highlight_precision", right / count(&found_there)?.max(1.0)),
         ("highlight_recall", right / count(&truly_there)?.max(1.0)),

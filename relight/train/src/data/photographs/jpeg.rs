@@ -5,7 +5,6 @@ use std::f64::consts::PI;
 use tch::Tensor;
 
 use crate::data::tensors::{columns, upload};
-use crate::error::TrainError;
 use relight_synth::PhotoCamera;
 
 const SIDE: i64 = 8;
@@ -34,40 +33,36 @@ const FROM_YCC: [f32; 9] = [
 ];
 
 /// Values, 0..=255 and `batch x 3 x side x side`, after their cameras' compression. The side is a multiple of 16.
-pub(super) fn compressed(values: &Tensor, cameras: &[&PhotoCamera]) -> Result<Tensor, TrainError> {
-    let colours = mixed(values, &TO_YCC)?;
+pub(super) fn compressed(values: &Tensor, cameras: &[&PhotoCamera]) -> Tensor {
+    let colours = mixed(values, &TO_YCC);
     let luminance = rounded(
-        &colours.f_narrow(1, 0, 1)?.f_add_scalar(-128.0)?,
-        &steps(cameras, &LUMINANCE, values)?,
-    )?
-    .f_add_scalar(128.0)?;
-    let fine = colours.f_narrow(1, 1, 2)?;
-    let table = steps(cameras, &CHROMINANCE, values)?;
-    let coarse = fine.f_avg_pool2d([2; 2], [2; 2], [0; 2], false, true, None)?;
+        &(colours.narrow(1, 0, 1) - 128.0),
+        &steps(cameras, &LUMINANCE, values),
+    ) + 128.0;
+    let fine = colours.narrow(1, 1, 2);
+    let table = steps(cameras, &CHROMINANCE, values);
+    let coarse = fine.avg_pool2d([2; 2], [2; 2], [0; 2], false, true, None);
     let size = values.size();
-    let coarse = rounded(&coarse, &table)?.f_upsample_nearest2d(
-        [size[2], size[3]],
-        None::<f64>,
-        None::<f64>,
-    )?;
+    let coarse =
+        rounded(&coarse, &table).upsample_nearest2d([size[2], size[3]], None::<f64>, None::<f64>);
     let halved: Vec<f32> = cameras
         .iter()
         .map(|camera| f32::from(u8::from(camera.jpeg.is_some_and(|(_, halved)| halved))))
         .collect();
-    let is_halved = columns(&halved, cameras.len(), values)?.f_gt(0.5)?;
-    let colour = coarse.f_where_self(&is_halved, &rounded(&fine, &table)?)?;
-    let all = Tensor::f_cat(&[luminance, colour], 1)?;
-    Ok(mixed(&all, &FROM_YCC)?.f_round()?.f_clamp(0.0, 255.0)?)
+    let is_halved = columns(&halved, cameras.len(), values).gt(0.5);
+    let colour = coarse.where_self(&is_halved, &rounded(&fine, &table));
+    let all = Tensor::cat(&[luminance, colour], 1);
+    mixed(&all, &FROM_YCC).round().clamp(0.0, 255.0)
 }
 
 /// Channels mixed by the rows of a matrix.
-fn mixed(of: &Tensor, rows: &[f32; 9]) -> Result<Tensor, TrainError> {
-    let mixed = upload(rows, &[3, 3], of)?.f_matmul(&of.f_flatten(2, -1)?)?;
-    Ok(mixed.f_reshape(of.size())?)
+fn mixed(of: &Tensor, rows: &[f32; 9]) -> Tensor {
+    let mixed = upload(rows, &[3, 3], of).matmul(&of.flatten(2, -1));
+    mixed.reshape(of.size())
 }
 
 /// The steps of each camera's quality, `batch x 1 x 1 x 1 x 8 x 8`, as libjpeg scales them.
-fn steps(cameras: &[&PhotoCamera], table: &[f32; 64], like: &Tensor) -> Result<Tensor, TrainError> {
+fn steps(cameras: &[&PhotoCamera], table: &[f32; 64], like: &Tensor) -> Tensor {
     let values: Vec<f32> = cameras
         .iter()
         .flat_map(|camera| {
@@ -84,38 +79,32 @@ fn steps(cameras: &[&PhotoCamera], table: &[f32; 64], like: &Tensor) -> Result<T
 }
 
 /// Planes whose blocks' cosines are rounded to these steps.
-fn rounded(of: &Tensor, steps: &Tensor) -> Result<Tensor, TrainError> {
+fn rounded(of: &Tensor, steps: &Tensor) -> Tensor {
     let size = of.size();
     let blocks = of
-        .f_reshape([size[0], size[1], size[2] / SIDE, SIDE, size[3] / SIDE, SIDE])?
-        .f_transpose(3, 4)?;
-    let cosines = cosines(of)?;
-    let back = cosines.f_transpose(0, 1)?;
-    let rounded = cosines
-        .f_matmul(&blocks)?
-        .f_matmul(&back)?
-        .f_div(steps)?
-        .f_round()?
-        .f_mul(steps)?;
-    Ok(back
-        .f_matmul(&rounded)?
-        .f_matmul(&cosines)?
-        .f_transpose(3, 4)?
-        .f_reshape(size)?)
+        .reshape([size[0], size[1], size[2] / SIDE, SIDE, size[3] / SIDE, SIDE])
+        .transpose(3, 4);
+    let cosines = cosines(of);
+    let back = cosines.transpose(0, 1);
+    let rounded = (cosines.matmul(&blocks).matmul(&back) / steps).round() * steps;
+    back.matmul(&rounded)
+        .matmul(&cosines)
+        .transpose(3, 4)
+        .reshape(size)
 }
 
 /// The orthonormal cosine transform of 8 values: a row for each frequency.
-fn cosines(like: &Tensor) -> Result<Tensor, TrainError> {
+fn cosines(like: &Tensor) -> Tensor {
     let value = |at: usize| {
         let (frequency, place) = ((at / 8) as f64, (at % 8) as f64);
         let scale = if at < 8 { 0.125_f64.sqrt() } else { 0.5 };
         scale * (PI * (2.0 * place + 1.0) * frequency / 16.0).cos()
     };
     let values: Vec<f64> = (0..64).map(value).collect();
-    Ok(Tensor::f_from_slice(&values)?
-        .f_reshape([SIDE, SIDE])?
-        .f_to_kind(like.kind())?
-        .f_to_device(like.device())?)
+    Tensor::from_slice(&values)
+        .reshape([SIDE, SIDE])
+        .to_kind(like.kind())
+        .to_device(like.device())
 }
 
 #[cfg(test)]
@@ -157,7 +146,7 @@ mod tests {
                 .encode_image(&picture)
                 .unwrap();
             let real = image::load_from_memory(&bytes).unwrap().into_rgb8();
-            let found = compressed(&values, &[&camera(quality, false)]).unwrap();
+            let found = compressed(&values, &[&camera(quality, false)]);
             let found = Vec::<f32>::try_from(found.flatten(0, -1)).unwrap();
             let (mut apart, mut lost) = (0.0, 0.0);
             for (at, value) in found.iter().enumerate() {
@@ -179,7 +168,7 @@ mod tests {
         let planes: Vec<f32> = (0..3 * 1024).map(|at| stripe(at % 32)[at / 1024]).collect();
         let values = Tensor::from_slice(&planes).reshape([1, 3, 32, 32]);
         let lost = |halved| {
-            let found = compressed(&values, &[&camera(98, halved)]).unwrap();
+            let found = compressed(&values, &[&camera(98, halved)]);
             (found - &values).abs().mean(Kind::Float).double_value(&[])
         };
         assert!(lost(false) < 3.0 && lost(true) > 20.0);

@@ -15,7 +15,6 @@ use super::VISIBILITY;
 use crate::data::direction_maps::DirectionMaps;
 use crate::data::tensors::{columns, dot, indices, of_light, unit, upload};
 use crate::data::view_pool::{FINISHES, Planned, ViewPool};
-use crate::error::TrainError;
 
 /// Albedo is kept in this range.
 const ALBEDO: (f64, f64) = (0.01, 0.95);
@@ -46,43 +45,43 @@ impl LitBatch {
         pool: &ViewPool<PhotoView>,
         maps: &DirectionMaps,
         photos: &[PlannedPhoto],
-    ) -> Result<Self, TrainError> {
-        let base = pool.base(photos)?;
-        let part = |from: usize, count: usize| base.f_narrow(1, from as i64, count as i64);
-        let mask = part(PhotoView::MASK, 1)?;
+    ) -> Self {
+        let base = pool.base(photos);
+        let part = |from: usize, count: usize| base.narrow(1, from as i64, count as i64);
+        let mask = part(PhotoView::MASK, 1);
         let finishes = photos.iter().map(|one| (one.place, one.plan.finish));
-        let finish = pool.parts(FINISHES, finishes)?;
-        let normals = finish.f_narrow(1, 0, 3)?;
-        let own_points = part(PhotoView::OBJECT_POINTS, 3)?;
-        let printed = printed(pool, photos, &own_points, finish.f_narrow(1, 3, 3)?)?;
-        let albedo = recoloured(photos, &printed)?.f_mul(&mask)?;
+        let finish = pool.parts(FINISHES, finishes);
+        let normals = finish.narrow(1, 0, 3);
+        let own_points = part(PhotoView::OBJECT_POINTS, 3);
+        let printed = printed(pool, photos, &own_points, finish.narrow(1, 3, 3));
+        let albedo = recoloured(photos, &printed) * &mask;
 
-        let rooms = lights(photos, |plan| &plan.room, &base)?;
-        let all = lights(photos, |plan| &plan.light, &base)?;
+        let rooms = lights(photos, |plan| &plan.room, &base);
+        let all = lights(photos, |plan| &plan.light, &base);
         let coefficients = PhotoView::ORDER.coefficients();
-        let blocked = of_light(&rooms, &part(PhotoView::BLOCKED, coefficients)?)?;
-        let open = maps.irradiance(&rooms, &normals)?;
+        let blocked = of_light(&rooms, &part(PhotoView::BLOCKED, coefficients));
+        let open = maps.irradiance(&rooms, &normals);
         let mut lit = Self {
-            shading: open.f_sub(&blocked)?.f_clamp_min(0.0)?,
-            highlight: albedo.f_zeros_like()?,
+            shading: (&open - &blocked).clamp_min(0.0),
+            highlight: albedo.zeros_like(),
             mask,
             normals,
             albedo,
         };
-        let points = part(PhotoView::POINTS, 3)?;
-        let eye = part(PhotoView::TOWARDS_EYE, 3)?;
-        lit.add_lamps(pool, photos, &points, &eye)?;
-        let bounced = of_light(&all, &part(PhotoView::BOUNCED, all.size()[1] as usize)?)?;
-        lit.add_bounce(photos, &bounced)?;
-        lit.add_mirrored(maps, photos, &rooms, &eye, &part(PhotoView::MIRRORS, 1)?)?;
-        lit.shading = lit.shading.f_mul(&lit.mask)?;
-        lit.highlight = lit.highlight.f_mul(&lit.mask)?;
-        Ok(lit)
+        let points = part(PhotoView::POINTS, 3);
+        let eye = part(PhotoView::TOWARDS_EYE, 3);
+        lit.add_lamps(pool, photos, &points, &eye);
+        let bounced = of_light(&all, &part(PhotoView::BOUNCED, all.size()[1] as usize));
+        lit.add_bounce(photos, &bounced);
+        lit.add_mirrored(maps, photos, &rooms, &eye, &part(PhotoView::MIRRORS, 1));
+        lit.shading = &lit.shading * &lit.mask;
+        lit.highlight = &lit.highlight * &lit.mask;
+        lit
     }
 
     /// What the surface sends to the camera.
-    pub(super) fn image(&self) -> Result<Tensor, TrainError> {
-        Ok(self.albedo.f_mul(&self.shading)?.f_add(&self.highlight)?)
+    pub(super) fn image(&self) -> Tensor {
+        &self.albedo * &self.shading + &self.highlight
     }
 
     /// The light of lamps, diffuse and as highlights.
@@ -92,7 +91,7 @@ impl LitBatch {
         photos: &[PlannedPhoto],
         points: &Tensor,
         eye: &Tensor,
-    ) -> Result<(), TrainError> {
+    ) {
         // Each lit lamp with the number of its photograph.
         let lit: Vec<(usize, &PlannedPhoto, usize)> = photos
             .iter()
@@ -100,46 +99,41 @@ impl LitBatch {
             .flat_map(|(at, photo)| (0..photo.plan.lamps.len()).map(move |k| (at, photo, k)))
             .collect();
         if lit.is_empty() {
-            return Ok(());
+            return;
         }
         let device = points.device();
         let of = |values: Vec<f32>| columns(&values, lit.len(), points);
         let lamp = |&(_, photo, k): &(usize, &PlannedPhoto, usize)| {
             pool.extra[photo.place][photo.plan.lamps[k].lamp]
         };
-        let centre = of(lit.iter().flat_map(|one| lamp(one).centre).collect())?;
+        let centre = of(lit.iter().flat_map(|one| lamp(one).centre).collect());
         let irradiance = of(lit
             .iter()
             .flat_map(|(_, photo, k)| photo.plan.lamps[*k].irradiance)
-            .collect())?;
+            .collect());
         let seen = lit
             .iter()
             .map(|(_, photo, k)| (photo.place, photo.plan.lamps[*k].lamp));
-        let visible = pool.parts(VISIBILITY, seen)?;
-        let whose = indices(lit.iter().map(|(at, ..)| *at), device)?;
+        let visible = pool.parts(VISIBILITY, seen);
+        let whose = indices(lit.iter().map(|(at, ..)| *at), device);
 
-        let normals = self.normals.f_index_select(0, &whose)?;
-        let way = centre.f_sub(&points.f_index_select(0, &whose)?)?;
-        let square = dot(&way, &way)?.f_clamp_min(1e-6)?;
-        let towards = way.f_mul(&square.f_rsqrt()?)?;
-        let distance = dot(&centre, &centre)?;
-        let aim = centre.f_mul(&distance.f_rsqrt()?)?;
+        let normals = self.normals.index_select(0, &whose);
+        let way = &centre - points.index_select(0, &whose);
+        let square = dot(&way, &way).clamp_min(1e-6);
+        let towards = &way * square.rsqrt();
+        let distance = dot(&centre, &centre);
+        let aim = &centre * distance.rsqrt();
         // A round area that faces the origin, as bright as its irradiance there says.
-        let falloff = dot(&towards, &aim)?
-            .f_clamp_min(0.0)?
-            .f_mul(&distance)?
-            .f_div(&square)?;
-        let cosine = dot(&normals, &towards)?.f_clamp_min(0.0)?;
-        let arriving = irradiance.f_mul(&visible.f_mul(&falloff)?)?;
-        let _ = self
-            .shading
-            .f_index_add_(0, &whose, &arriving.f_mul(&cosine)?)?;
+        let falloff = dot(&towards, &aim).clamp_min(0.0) * &distance / &square;
+        let cosine = dot(&normals, &towards).clamp_min(0.0);
+        let arriving = &irradiance * (&visible * &falloff);
+        let _ = self.shading.index_add_(0, &whose, &(&arriving * &cosine));
 
         let glossy: Vec<usize> = (0..lit.len())
             .filter(|&k| lit[k].1.plan.gloss.is_some())
             .collect();
         if glossy.is_empty() {
-            return Ok(());
+            return;
         }
         let lobes: Vec<(f32, [f32; 3])> = glossy
             .iter()
@@ -154,31 +148,27 @@ impl LitBatch {
             .collect();
         let exponents = lobes.iter().map(|(exponent, _)| *exponent).collect();
         let exponents: Vec<f32> = exponents;
-        let exponent = columns(&exponents, glossy.len(), points)?;
+        let exponent = columns(&exponents, glossy.len(), points);
         let strengths: Vec<f32> = lobes.iter().flat_map(|(_, strength)| *strength).collect();
-        let strength = columns(&strengths, glossy.len(), points)?;
-        let chosen = indices(glossy.iter().copied(), device)?;
-        let pick = |of: &Tensor| of.f_index_select(0, &chosen);
-        let whose = whose.f_index_select(0, &chosen)?;
-        let half = unit(&pick(&towards)?.f_add(&eye.f_index_select(0, &whose)?)?)?;
-        let lobe = dot(&pick(&normals)?, &half)?
-            .f_clamp_min(1e-6)?
-            .f_pow(&exponent)?
-            .f_mul(&pick(&cosine)?.f_gt(0.0)?)?;
-        let highlight = pick(&arriving)?.f_mul(&lobe)?.f_mul(&strength)?;
-        let _ = self.highlight.f_index_add_(0, &whose, &highlight)?;
-        Ok(())
+        let strength = columns(&strengths, glossy.len(), points);
+        let chosen = indices(glossy.iter().copied(), device);
+        let pick = |of: &Tensor| of.index_select(0, &chosen);
+        let whose = whose.index_select(0, &chosen);
+        let half = unit(&(pick(&towards) + eye.index_select(0, &whose)));
+        let lobe =
+            dot(&pick(&normals), &half).clamp_min(1e-6).pow(&exponent) * pick(&cosine).gt(0.0);
+        let highlight = pick(&arriving) * &lobe * &strength;
+        let _ = self.highlight.index_add_(0, &whose, &highlight);
     }
 
     /// The light that the object throws onto itself.
-    fn add_bounce(&mut self, photos: &[PlannedPhoto], bounced: &Tensor) -> Result<(), TrainError> {
+    fn add_bounce(&mut self, photos: &[PlannedPhoto], bounced: &Tensor) {
         let bounce: Vec<f32> = photos.iter().flat_map(|one| one.plan.bounce).collect();
-        let bounce = columns(&bounce, photos.len(), bounced)?;
-        let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
-        let mean = over(&self.albedo)?.f_div(&over(&self.mask)?.f_clamp_min(1.0)?)?;
-        let light = bounced.f_clamp_min(0.0)?.f_mul(&mean.f_mul(&bounce)?)?;
-        self.shading = self.shading.f_add(&light)?;
-        Ok(())
+        let bounce = columns(&bounce, photos.len(), bounced);
+        let over = |of: &Tensor| of.sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+        let mean = over(&self.albedo) / over(&self.mask).clamp_min(1.0);
+        let light = bounced.clamp_min(0.0) * (&mean * &bounce);
+        self.shading = &self.shading + &light;
     }
 
     /// Highlights of the room.
@@ -189,7 +179,7 @@ impl LitBatch {
         rooms: &Tensor,
         eye: &Tensor,
         mirrors: &Tensor,
-    ) -> Result<(), TrainError> {
+    ) {
         let device = rooms.device();
         let glossy: Vec<(usize, f32, [f32; 3])> = photos
             .iter()
@@ -200,26 +190,25 @@ impl LitBatch {
             })
             .collect();
         if glossy.is_empty() {
-            return Ok(());
+            return;
         }
-        let whose = indices(glossy.iter().map(|(at, ..)| *at), device)?;
-        let pick = |of: &Tensor| of.f_index_select(0, &whose);
-        let (normals, eye) = (pick(&self.normals)?, pick(eye)?);
-        let facing = dot(&normals, &eye)?.f_clamp_min(0.0)?;
-        let mirrored = unit(&normals.f_mul(&facing.f_mul_scalar(2.0)?)?.f_sub(&eye)?)?;
+        let whose = indices(glossy.iter().map(|(at, ..)| *at), device);
+        let pick = |of: &Tensor| of.index_select(0, &whose);
+        let (normals, eye) = (pick(&self.normals), pick(eye));
+        let facing = dot(&normals, &eye).clamp_min(0.0);
+        let mirrored = unit(&(&normals * (&facing * 2.0) - &eye));
         let blurs: Vec<f32> = glossy.iter().map(|(_, e, _)| 2.0 / e.sqrt()).collect();
         let strengths: Vec<f32> = glossy
             .iter()
             .flat_map(|(_, exponent, s)| s.map(|s| 8.0 * s / (exponent + 1.0)))
             .collect();
-        let strength = columns(&strengths, glossy.len(), rooms)?;
+        let strength = columns(&strengths, glossy.len(), rooms);
         let seen = maps
-            .radiance(&pick(rooms)?, &mirrored, &blurs)?
-            .f_clamp_min(0.0)?
-            .f_mul(&facing.f_mul(&pick(mirrors)?)?)?
-            .f_mul(&strength)?;
-        let _ = self.highlight.f_index_add_(0, &whose, &seen)?;
-        Ok(())
+            .radiance(&pick(rooms), &mirrored, &blurs)
+            .clamp_min(0.0)
+            * (&facing * pick(mirrors))
+            * &strength;
+        let _ = self.highlight.index_add_(0, &whose, &seen);
     }
 }
 
@@ -236,7 +225,7 @@ fn printed(
     photos: &[PlannedPhoto],
     own_points: &Tensor,
     mut albedo: Tensor,
-) -> Result<Tensor, TrainError> {
+) -> Tensor {
     let device = albedo.device();
     let prints: Vec<_> = photos
         .iter()
@@ -244,41 +233,35 @@ fn printed(
         .filter_map(|(at, one)| Some((at, one.place, one.plan.print?)))
         .collect();
     if prints.is_empty() {
-        return Ok(albedo);
+        return albedo;
     }
-    let whose = indices(prints.iter().map(|(at, ..)| *at), device)?;
+    let whose = indices(prints.iter().map(|(at, ..)| *at), device);
     let others = prints
         .iter()
         .map(|(_, place, print)| (*place, print.finish));
-    let other = pool.parts(FINISHES, others)?.f_narrow(1, 3, 3)?;
+    let other = pool.parts(FINISHES, others).narrow(1, 3, 3);
     let count = prints.len() as i64;
     let waves: Vec<f32> = prints
         .iter()
         .flat_map(|(.., print)| print.waves.into_iter().flatten())
         .collect();
-    let waves = upload(&waves, &[count, 3, 4], own_points)?;
-    let points = own_points.f_index_select(0, &whose)?;
+    let waves = upload(&waves, &[count, 3, 4], own_points);
+    let points = own_points.index_select(0, &whose);
     let side = points.size()[2];
-    let phases = waves
-        .f_narrow(2, 0, 3)?
-        .f_bmm(&points.f_reshape([count, 3, -1])?)?
-        .f_add(&waves.f_narrow(2, 3, 1)?)?;
+    let phases = waves.narrow(2, 0, 3).bmm(&points.reshape([count, 3, -1])) + waves.narrow(2, 3, 1);
     let sum = phases
-        .f_sin()?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_reshape([count, 1, side, side])?;
+        .sin()
+        .sum_dim_intlist([1_i64].as_slice(), true, None)
+        .reshape([count, 1, side, side]);
     let levels: Vec<f32> = prints.iter().map(|(.., print)| print.level).collect();
-    let share = sum
-        .f_sub(&columns(&levels, prints.len(), own_points)?)?
-        .f_mul_scalar(PRINT_EDGE)?
-        .f_sigmoid()?;
-    let ground = albedo.f_index_select(0, &whose)?;
-    let mixed = ground.f_lerp_tensor(&other, &share.f_expand_as(&other)?)?;
-    Ok(albedo.f_index_copy_(0, &whose, &mixed)?)
+    let share = ((&sum - columns(&levels, prints.len(), own_points)) * PRINT_EDGE).sigmoid();
+    let ground = albedo.index_select(0, &whose);
+    let mixed = ground.lerp_tensor(&other, &share.expand_as(&other));
+    albedo.index_copy_(0, &whose, &mixed)
 }
 
 /// Albedo in other colours.
-fn recoloured(photos: &[PlannedPhoto], albedo: &Tensor) -> Result<Tensor, TrainError> {
+fn recoloured(photos: &[PlannedPhoto], albedo: &Tensor) -> Tensor {
     let count = photos.len() as i64;
     let of = |values: Vec<f32>| columns(&values, photos.len(), albedo);
     // Column by column: the transpose of what a matrix of rows is.
@@ -286,18 +269,18 @@ fn recoloured(photos: &[PlannedPhoto], albedo: &Tensor) -> Result<Tensor, TrainE
         .iter()
         .flat_map(|one| one.plan.recolour.into_iter().flatten())
         .collect();
-    let mixes = upload(&mixes, &[count, 3, 3], albedo)?.f_transpose(1, 2)?;
-    let contrast = of(photos.iter().map(|one| one.plan.contrast).collect())?;
-    let plain = of(photos.iter().flat_map(|one| one.plan.plain).collect())?;
+    let mixes = upload(&mixes, &[count, 3, 3], albedo).transpose(1, 2);
+    let contrast = of(photos.iter().map(|one| one.plan.contrast).collect());
+    let plain = of(photos.iter().flat_map(|one| one.plan.plain).collect());
     let is_plain = photos.iter().map(|one| one.plan.plain != [0.0; 3]);
-    let is_plain = of(is_plain.map(|is| f32::from(u8::from(is))).collect())?.f_gt(0.5)?;
+    let is_plain = of(is_plain.map(|is| f32::from(u8::from(is))).collect()).gt(0.5);
     let mixed = mixes
-        .f_bmm(&albedo.f_reshape([count, 3, -1])?)?
-        .f_reshape(albedo.size())?
-        .f_clamp(ALBEDO.0, ALBEDO.1)?
-        .f_pow(&contrast)?
-        .f_clamp(ALBEDO.0, ALBEDO.1)?;
-    Ok(plain.f_where_self(&is_plain, &mixed)?)
+        .bmm(&albedo.reshape([count, 3, -1]))
+        .reshape(albedo.size())
+        .clamp(ALBEDO.0, ALBEDO.1)
+        .pow(&contrast)
+        .clamp(ALBEDO.0, ALBEDO.1);
+    plain.where_self(&is_plain, &mixed)
 }
 
 /// Lights as `batch x coefficients x 3`.
@@ -305,7 +288,7 @@ fn lights<'a>(
     photos: &'a [PlannedPhoto],
     of: impl Fn(&'a PhotoPlan) -> &'a [[f32; 3]],
     like: &Tensor,
-) -> Result<Tensor, TrainError> {
+) -> Tensor {
     let values: Vec<f32> = photos
         .iter()
         .flat_map(|photo| of(&photo.plan).as_flattened().iter().copied())
@@ -335,9 +318,9 @@ mod tests {
         let views: Vec<PhotoView> = (0..3)
             .map(|number| PhotoView::cast(&recipe, &library, number))
             .collect();
-        let mut pool = ViewPool::new(3, recipe.size, (Kind::Float, Device::Cpu)).unwrap();
+        let mut pool = ViewPool::new(3, recipe.size, (Kind::Float, Device::Cpu));
         for (place, view) in views.iter().enumerate() {
-            pool.put(place, view.clone()).unwrap();
+            pool.put(place, view.clone());
         }
         let made = made_panoramas().unwrap();
         let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
@@ -419,8 +402,8 @@ mod tests {
         for photo in &mut photos {
             photo.plan.bounce = [0.0; 3];
         }
-        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu)).unwrap();
-        let lit = LitBatch::new(&pool, &maps, &photos).unwrap();
+        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu));
+        let lit = LitBatch::new(&pool, &maps, &photos);
         let (mut off, mut sum) = ([0.0; 2], [0.0; 2]);
         for (at, photo) in photos.iter().enumerate() {
             let view = &views[photo.place];
@@ -450,12 +433,12 @@ mod tests {
     #[test]
     fn a_photograph_is_lit_alike_whatever_else_is_in_its_batch() {
         let (pool, photos, _) = photographs();
-        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu)).unwrap();
-        let all = LitBatch::new(&pool, &maps, &photos).unwrap();
+        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu));
+        let all = LitBatch::new(&pool, &maps, &photos);
         for (at, photo) in photos.iter().enumerate() {
-            let one = LitBatch::new(&pool, &maps, std::slice::from_ref(photo)).unwrap();
+            let one = LitBatch::new(&pool, &maps, std::slice::from_ref(photo));
             for (one, all) in [
-                (one.image().unwrap(), all.image().unwrap()),
+                (one.image(), all.image()),
                 (one.shading, all.shading.shallow_clone()),
             ] {
                 let apart = one.get(0) - all.get(at as i64);
@@ -467,9 +450,8 @@ mod tests {
     #[test]
     fn light_that_bounces_makes_hollows_brighter_and_nothing_darker() {
         let (pool, mut photos, _) = photographs();
-        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu)).unwrap();
-        let shading =
-            |photos: &[PlannedPhoto]| LitBatch::new(&pool, &maps, photos).unwrap().shading;
+        let maps = DirectionMaps::new(PhotoView::ORDER, (Kind::Float, Device::Cpu));
+        let shading = |photos: &[PlannedPhoto]| LitBatch::new(&pool, &maps, photos).shading;
         photos
             .iter_mut()
             .for_each(|photo| photo.plan.bounce = [0.0; 3]);

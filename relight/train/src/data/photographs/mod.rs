@@ -124,11 +124,11 @@ impl Photographs {
         let (views, seed) = (self.data.views_at(step), stream(self.seed, step));
         let (open, photos, seeds) = self.source.draw(views, self.batch, seed)?;
         let symmetry = Symmetry::from_bits(stream(seed, u64::MAX));
-        no_grad(|| {
-            let lit = LitBatch::new(&open.pool, &open.maps, &photos)?;
+        Ok(no_grad(|| {
+            let lit = LitBatch::new(&open.pool, &open.maps, &photos);
             let noise = (&open.noise, seeds.as_slice());
-            let photographed = photograph(&lit.image()?, &lit.mask, &photos, noise)?;
+            let photographed = photograph(&lit.image(), &lit.mask, &photos, noise);
             truth::truth(&lit, &photographed, &photos, symmetry)
-        })
+        }))
     }
 }

@@ -10,7 +10,6 @@ use super::lit::{LitBatch, PlannedPhoto};
 use crate::data::sample::TruthBatch;
 use crate::data::symmetry::Symmetry;
 use crate::data::tensors::upload;
-use crate::error::TrainError;
 
 /// The power of the encoded colour.
 const ENCODED: f64 = 1.0 / 2.2;
@@ -21,97 +20,73 @@ pub(super) fn truth(
     photographed: &SimulatedPhotos,
     photos: &[PlannedPhoto],
     symmetry: Symmetry,
-) -> Result<TruthBatch, TrainError> {
+) -> TruthBatch {
     let mask = &lit.mask;
-    let over = |of: &Tensor, dims: &[i64]| of.f_sum_dim_intlist(dims, true, None);
-    let covered = over(mask, &[2, 3])?.f_clamp_min(1.0)?;
-    let shading = lit.shading.f_mul(&photographed.gain)?;
-    let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
-    let mean = over(&grey, &[2, 3])?.f_div(&covered)?.f_clamp_min(1e-6)?;
-    let white = percentile(&photographed.picture, mask)?;
-    let picture = photographed.picture.f_div(&white)?;
+    let over = |of: &Tensor, dims: &[i64]| of.sum_dim_intlist(dims, true, None);
+    let covered = over(mask, &[2, 3]).clamp_min(1.0);
+    let shading = &lit.shading * &photographed.gain;
+    let grey = shading.mean_dim([1_i64].as_slice(), true, None);
+    let mean = (over(&grey, &[2, 3]) / &covered).clamp_min(1e-6);
+    let white = percentile(&photographed.picture, mask);
+    let picture = &photographed.picture / &white;
 
     // What a highlight adds to a picture that is clipped at 1.
-    let diffuse = lit.albedo.f_mul(&shading)?;
-    let highlight = lit.highlight.f_mul(&photographed.gain)?;
-    let shown = diffuse
-        .f_add(&highlight)?
-        .f_clamp_max(1.0)?
-        .f_sub(&diffuse.f_clamp_max(1.0)?)?
-        .f_mean_dim([1_i64].as_slice(), true, None)?
-        .f_div(&white)?;
+    let diffuse = &lit.albedo * &shading;
+    let highlight = &lit.highlight * &photographed.gain;
+    let shown = ((&diffuse + &highlight).clamp_max(1.0) - diffuse.clamp_max(1.0)).mean_dim(
+        [1_i64].as_slice(),
+        true,
+        None,
+    ) / &white;
 
     let seen = |of: &Tensor| seen_in(of, symmetry);
-    let normals = turned_normals(&lit.normals.f_mul(mask)?, symmetry)?;
-    Ok(TruthBatch {
-        input: seen(&encoded(&picture, mask)?)?,
-        mask: seen(mask)?,
-        picture: seen(&picture)?,
-        shading: seen(&grey.f_div(&mean)?)?,
-        albedo: seen(&lit.albedo)?,
-        normals: seen(&normals)?,
-        highlight: seen(&shown)?,
-        light: light(photos, &photographed.gain, &mean, symmetry)?,
-    })
+    let normals = turned_normals(&(&lit.normals * mask), symmetry);
+    TruthBatch {
+        input: seen(&encoded(&picture, mask)),
+        mask: seen(mask),
+        picture: seen(&picture),
+        shading: seen(&(&grey / &mean)),
+        albedo: seen(&lit.albedo),
+        normals: seen(&normals),
+        highlight: seen(&shown),
+        light: light(photos, &photographed.gain, &mean, symmetry),
+    }
 }
 
 /// The input of the decomposing network, as [`relight_photo::decompose::NetworkInput`] makes it one by one.
-pub(crate) fn encoded(picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    let light = picture.f_clamp(0.0, f64::from(MAX_LIGHT))?;
-    let colour = light
-        .f_pow_tensor_scalar(ENCODED)?
-        .f_mul_scalar(2.0)?
-        .f_add_scalar(-1.0)?;
-    let sum = light.f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
-    let mean = sum.f_mul_scalar(1.0 / 3.0)?;
-    let log = mean
-        .f_add_scalar(f64::from(LOG_FLOOR))?
-        .f_log()?
-        .f_add_scalar(2.0)?
-        .f_mul_scalar(0.5)?;
-    let chroma = light
-        .f_narrow(1, 0, 2)?
-        .f_sub(&mean)?
-        .f_mul_scalar(4.0)?
-        .f_div(&sum.f_add_scalar(0.03)?)?;
-    let all = Tensor::f_cat(&[colour, mask.shallow_clone(), log, chroma], 1)?;
-    Ok(all.f_mul(mask)?)
+pub(crate) fn encoded(picture: &Tensor, mask: &Tensor) -> Tensor {
+    let light = picture.clamp(0.0, f64::from(MAX_LIGHT));
+    let colour = light.pow_tensor_scalar(ENCODED) * 2.0 - 1.0;
+    let sum = light.sum_dim_intlist([1_i64].as_slice(), true, None);
+    let mean = &sum * (1.0 / 3.0);
+    let log = ((&mean + f64::from(LOG_FLOOR)).log() + 2.0) * 0.5;
+    let chroma = (light.narrow(1, 0, 2) - &mean) * 4.0 / (&sum + 0.03);
+    let all = Tensor::cat(&[colour, mask.shallow_clone(), log, chroma], 1);
+    &all * mask
 }
 
 /// What the head for light should predict, `batch x 9`.
-fn light(
-    photos: &[PlannedPhoto],
-    gain: &Tensor,
-    mean: &Tensor,
-    symmetry: Symmetry,
-) -> Result<Tensor, TrainError> {
+fn light(photos: &[PlannedPhoto], gain: &Tensor, mean: &Tensor, symmetry: Symmetry) -> Tensor {
     let count = photos.len() as i64;
     let values: Vec<f32> = photos
         .iter()
         .flat_map(|one| one.plan.light.as_flattened().iter().copied())
         .collect();
-    let lights = upload(&values, &[count, LIGHT_OUTPUTS as i64, 3], gain)?;
-    let grey = lights.f_mul(&gain.f_reshape([count, 1, 3])?)?.f_mean_dim(
-        [2_i64].as_slice(),
-        false,
-        None,
-    )?;
+    let lights = upload(&values, &[count, LIGHT_OUTPUTS as i64, 3], gain);
+    let grey = (&lights * gain.reshape([count, 1, 3])).mean_dim([2_i64].as_slice(), false, None);
     // The coefficients in their new order, with their signs: each number of this list is a place from 1 on.
     let places = symmetry.light([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0_f32]);
     let order: Vec<i64> = places.iter().map(|at| at.abs() as i64 - 1).collect();
     let factors: Vec<f32> = (0..LIGHT_OUTPUTS)
         .map(|at| cosine_lobe(at.isqrt()) as f32 * places[at].signum())
         .collect();
-    let order = Tensor::f_from_slice(&order)?.f_to_device(gain.device())?;
-    let factors = Tensor::f_from_slice(&factors)?.f_to_device(gain.device())?;
-    Ok(grey
-        .f_index_select(1, &order)?
-        .f_mul(&factors)?
-        .f_div(&mean.f_reshape([count, 1])?)?)
+    let order = Tensor::from_slice(&order).to_device(gain.device());
+    let factors = Tensor::from_slice(&factors).to_device(gain.device());
+    grey.index_select(1, &order) * &factors / mean.reshape([count, 1])
 }
 
 /// Planes as they are seen in a symmetry.
-fn seen_in(of: &Tensor, symmetry: Symmetry) -> Result<Tensor, tch::TchError> {
+fn seen_in(of: &Tensor, symmetry: Symmetry) -> Tensor {
     let mut axes = Vec::new();
     if symmetry.mirrored {
         axes.push(3_i64);
@@ -122,25 +97,23 @@ fn seen_in(of: &Tensor, symmetry: Symmetry) -> Result<Tensor, tch::TchError> {
     let flipped = if axes.is_empty() {
         of.shallow_clone()
     } else {
-        of.f_flip(axes)?
+        of.flip(axes)
     };
     if symmetry.transposed {
-        return flipped.f_transpose(2, 3)?.f_contiguous();
+        return flipped.transpose(2, 3).contiguous();
     }
-    Ok(flipped)
+    flipped
 }
 
 /// Normals whose components are those of the symmetry; their places are still the old ones.
-fn turned_normals(normals: &Tensor, symmetry: Symmetry) -> Result<Tensor, TrainError> {
+fn turned_normals(normals: &Tensor, symmetry: Symmetry) -> Tensor {
     let components: Vec<Tensor> = (0..3)
         .map(|axis| {
             let (from, sign) = symmetry.component(axis);
-            normals
-                .f_narrow(1, from as i64, 1)?
-                .f_mul_scalar(f64::from(sign))
+            normals.narrow(1, from as i64, 1) * f64::from(sign)
         })
-        .collect::<Result<_, _>>()?;
-    Ok(Tensor::f_cat(&components, 1)?)
+        .collect();
+    Tensor::cat(&components, 1)
 }
 
 #[cfg(test)]
@@ -162,7 +135,7 @@ mod tests {
         };
         let all: Vec<f32> = picture.planes().into_iter().flatten().copied().collect();
         let whites = tensor(all, 3) / f64::from(one.white());
-        let found = encoded(&whites, &tensor(mask.plane(0).to_vec(), 1)).unwrap();
+        let found = encoded(&whites, &tensor(mask.plane(0).to_vec(), 1));
         let found = Vec::<f32>::try_from(found.flatten(0, -1)).unwrap();
         for (found, expected) in found.iter().zip(one.values()) {
             assert!((found - expected).abs() < 1e-4, "{found} {expected}");
@@ -176,9 +149,9 @@ mod tests {
         let planes = Tensor::from_slice(&values).reshape([1, 3, 4, 4]);
         for bits in 0..8 {
             let symmetry = Symmetry::from_bits(bits);
-            let seen = |of: &Tensor| seen_in(of, symmetry).unwrap();
+            let seen = |of: &Tensor| seen_in(of, symmetry);
             let found = Vec::<f32>::try_from(seen(&planes).flatten(0, -1)).unwrap();
-            let turned = turned_normals(&planes, symmetry).unwrap();
+            let turned = turned_normals(&planes, symmetry);
             let turned = Vec::<f32>::try_from(seen(&turned).flatten(0, -1)).unwrap();
             for at in 0..16 {
                 let source = symmetry.source(extent, at % 4, at / 4);

@@ -143,7 +143,7 @@ impl Turns {
         seed: u64,
     ) -> Result<TurnBatch, TrainError> {
         let (open, turns, seeds) = self.0.draw(views, batch, seed)?;
-        no_grad(|| batch_of(open, &turns, &seeds))
+        Ok(no_grad(|| batch_of(open, &turns, &seeds)))
     }
 }
 
@@ -155,22 +155,14 @@ fn seeds(seed: u64) -> SourceSeeds {
     }
 }
 
-fn batch_of(
-    open: &OpenPool<TurnView>,
-    turns: &[PlannedTurn],
-    seeds: &[u64],
-) -> Result<TurnBatch, TrainError> {
-    let lit = LitTurns::new(&open.pool, &open.maps, turns)?;
-    let noise = open.noise.of(seeds, lit.curves.kind())?;
-    let seen = filmed(lit, turns, &noise)?;
-    Ok(TurnBatch {
-        input: network_input(&seen.curves, &seen.mask, turns)?,
-        log_albedo: seen
-            .albedo
-            .f_clamp_min(MIN_ALBEDO)?
-            .f_log()?
-            .f_mul(&seen.mask)?,
+fn batch_of(open: &OpenPool<TurnView>, turns: &[PlannedTurn], seeds: &[u64]) -> TurnBatch {
+    let lit = LitTurns::new(&open.pool, &open.maps, turns);
+    let noise = open.noise.of(seeds, lit.curves.kind());
+    let seen = filmed(lit, turns, &noise);
+    TurnBatch {
+        input: network_input(&seen.curves, &seen.mask, turns),
+        log_albedo: seen.albedo.clamp_min(MIN_ALBEDO).log() * &seen.mask,
         normals: seen.normals,
         mask: seen.mask,
-    })
+    }
 }

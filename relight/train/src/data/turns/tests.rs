@@ -27,9 +27,9 @@ fn planned(count: u64) -> (OpenPool<TurnView>, Vec<PlannedTurn>, Vec<TurnView>) 
         .map(|number| TurnView::cast(&recipe, &library, number))
         .collect();
     let place = (Kind::Float, Device::Cpu);
-    let mut pool = ViewPool::new(3, recipe.size, place).unwrap();
+    let mut pool = ViewPool::new(3, recipe.size, place);
     for (place, view) in views.iter().enumerate() {
-        pool.put(place, view.clone()).unwrap();
+        pool.put(place, view.clone());
     }
     let made = made_panoramas().unwrap();
     let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
@@ -50,8 +50,8 @@ fn planned(count: u64) -> (OpenPool<TurnView>, Vec<PlannedTurn>, Vec<TurnView>) 
     let open = OpenPool {
         loader: ViewLoader::start(&cast, Rank::ONLY, 3, &resources).unwrap(),
         pool,
-        maps: DirectionMaps::new(TurnView::ORDER, place).unwrap(),
-        noise: NoiseTiles::new((36, SIZE as i64), 1, Device::Cpu).unwrap(),
+        maps: DirectionMaps::new(TurnView::ORDER, place),
+        noise: NoiseTiles::new((36, SIZE as i64), 1, Device::Cpu),
     };
     (open, turns, views)
 }
@@ -123,8 +123,8 @@ fn by_formula(
 #[test]
 fn tensors_light_turns_as_the_formulas_do_one_by_one() {
     let (open, turns, views) = planned(60);
-    let lit = LitTurns::new(&open.pool, &open.maps, &turns).unwrap();
-    let means = lit::mean_over(&lit.albedo, &lit.mask).unwrap();
+    let lit = LitTurns::new(&open.pool, &open.maps, &turns);
+    let means = lit::mean_over(&lit.albedo, &lit.mask);
     // Matt, glossy, metal.
     let (mut off, mut sum) = ([0.0; 3], [0.0; 3]);
     for (at, turn) in turns.iter().enumerate() {
@@ -182,10 +182,10 @@ fn curves_of(lit: &LitTurns, at: usize) -> (Vec<u32>, Vec<CurveTerms>) {
 #[test]
 fn the_network_sees_the_same_in_training_as_at_work() {
     let (open, turns, _) = planned(12);
-    let lit = LitTurns::new(&open.pool, &open.maps, &turns).unwrap();
-    let noise = open.noise.of(&[7; 12], Kind::Float).unwrap();
-    let seen = filmed(lit, &turns, &noise).unwrap();
-    let input = network_input(&seen.curves, &seen.mask, &turns).unwrap();
+    let lit = LitTurns::new(&open.pool, &open.maps, &turns);
+    let noise = open.noise.of(&[7; 12], Kind::Float);
+    let seen = filmed(lit, &turns, &noise);
+    let input = network_input(&seen.curves, &seen.mask, &turns);
     for (at, turn) in turns.iter().enumerate() {
         let (pixels, curves) = curves_of(&seen, at);
         let at_work = relight_turn::network_input(&NetworkTurn {
@@ -207,9 +207,9 @@ fn the_network_sees_the_same_in_training_as_at_work() {
 fn a_turn_is_the_same_whatever_else_is_in_its_batch() {
     let (open, turns, _) = planned(12);
     let seeds: Vec<u64> = (0..12).collect();
-    let all = batch_of(&open, &turns, &seeds).unwrap();
+    let all = batch_of(&open, &turns, &seeds);
     for at in 0..turns.len() {
-        let one = batch_of(&open, &turns[at..=at], &seeds[at..=at]).unwrap();
+        let one = batch_of(&open, &turns[at..=at], &seeds[at..=at]);
         for (one, all) in [(one.input, &all.input), (one.normals, &all.normals)] {
             let apart = one.get(0) - all.get(at as i64);
             assert!(apart.abs().max().double_value(&[]) < 1e-3);
@@ -221,12 +221,12 @@ fn a_turn_is_the_same_whatever_else_is_in_its_batch() {
 fn in_a_mirror_a_turn_is_that_of_the_mirrored_object_in_the_mirrored_light() {
     let (open, mut turns, _) = planned(6);
     let filmed_with = |turns: &[PlannedTurn]| {
-        let lit = LitTurns::new(&open.pool, &open.maps, turns).unwrap();
+        let lit = LitTurns::new(&open.pool, &open.maps, turns);
         let noise = Tensor::zeros(
             [6, 36, SIZE as i64, SIZE as i64],
             (Kind::Float, Device::Cpu),
         );
-        filmed(lit, turns, &noise).unwrap()
+        filmed(lit, turns, &noise)
     };
     for turn in &mut turns {
         turn.plan.is_mirrored = false;
@@ -271,8 +271,8 @@ fn clipping_darkens_the_bright_pixels_of_the_turns_that_clip_and_no_others() {
         (Kind::Float, Device::Cpu),
     );
     let film = |turns: &[PlannedTurn]| {
-        let lit = LitTurns::new(&open.pool, &open.maps, turns).unwrap();
-        filmed(lit, turns, &noise).unwrap().curves
+        let lit = LitTurns::new(&open.pool, &open.maps, turns);
+        filmed(lit, turns, &noise).curves
     };
     let before = film(&turns);
     turns[2].plan.clipped = Some(0.7);
