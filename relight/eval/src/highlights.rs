@@ -1,9 +1,9 @@
 //! Highlights of single images: the table on highlight separation.
 
-use super::run::{Scored, add_method, cut_out, largest, measured, need, object};
-use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use super::run::{compared, cut_out, evaluate, largest, need, object};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreLine, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
-use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit, dssim};
+use relight_core::metrics::{SSIM_WINDOW, ScaleFit, dssim};
 use relight_core::reader::{TruthSample, TruthSet};
 
 /// MSE and DSSIM of the highlight, and of the image without it, for no highlight and for each prediction (part `highlight`, in
@@ -23,32 +23,19 @@ pub fn evaluate_highlights(
             .to_owned(),
         format!("SSIM by {}", SSIM_WINDOW),
     ];
-    let mut table = ScoreTable::new("highlights", notes);
-    let steps = (1 + predictions.len()) * set.names().len();
-    let progress = || progress(steps);
-    add_method(
-        &mut table,
+    let none = |sample: &TruthSample| Ok(Rgb::new(Planes::zeros(sample.extent())));
+    evaluate(
+        ScoreTable::new("highlights", notes),
         (set, split),
-        "no highlight",
-        &progress,
-        |sample| score(sample, &Rgb::new(Planes::zeros(sample.extent()))),
-    )?;
-    for found in predictions {
-        add_method(
-            &mut table,
-            (set, split),
-            &found.name(),
-            &progress,
-            |sample| {
-                let highlight = found.colour(&sample.name, "highlight", sample.extent())?;
-                score(sample, &highlight)
-            },
-        )?;
-    }
-    Ok(table)
+        vec![("no highlight", Box::new(none))],
+        predictions,
+        |found, sample| found.colour(&sample.name, "highlight", sample.extent()),
+        score,
+        progress,
+    )
 }
 
-fn score(sample: &TruthSample, found: &Rgb<Linear>) -> Result<Vec<Scored>, EvalError> {
+fn score(sample: &TruthSample, found: &Rgb<Linear>) -> Result<Vec<ScoreLine>, EvalError> {
     let image = need(sample, "image", &sample.image)?;
     let truth = need(sample, "highlight", &sample.highlight)?;
     let mask = object(sample);
@@ -69,17 +56,13 @@ fn score(sample: &TruthSample, found: &Rgb<Linear>) -> Result<Vec<Scored>, EvalE
     let mut lines = Vec::new();
     for (part, truth, found) in &parts {
         for (mask, rule) in [(&mask, MaskRule::Object), (&whole, MaskRule::WholeImage)] {
-            let (truth, found) = (truth.planes(), found.planes());
-            let pair = Comparison::new(sample.extent(), &truth, &found, mask);
-            let pair = measured(sample, pair)?;
-            let ssim = measured(sample, pair.ssim())?;
-            lines.push(Scored {
+            let [mse, _, ssim] = compared(&sample.name, truth, found, mask)?;
+            lines.push(ScoreLine::of_image(
                 part,
-                measures: vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))],
-                colour: "sRGB, image's maximum 1",
-                scale: ScaleFit::None.name(),
-                mask: rule,
-            });
+                &[("MSE", mse), ("DSSIM", dssim(ssim))],
+                ("sRGB, image's maximum 1", ScaleFit::None),
+                rule,
+            ));
         }
     }
     Ok(lines)

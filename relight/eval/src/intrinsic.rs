@@ -1,7 +1,7 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::run::{Scored, UNLIT, add_method, grey, measured, need, object, of_grey};
-use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use super::run::{NOT_MEASURED, UNLIT, evaluate, grey, need, object, of_grey};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreLine, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
 use relight_core::reader::{TruthSample, TruthSet};
@@ -134,39 +134,36 @@ pub fn evaluate_intrinsic(
         table.notes.push(note.to_owned());
         baselines.retain(|(baseline, _)| *baseline != Baseline::Oracle);
     }
-    let steps = (baselines.len() + predictions.len()) * set.names().len();
-    let progress = || progress(steps);
-    for (baseline, name) in baselines {
-        add_method(&mut table, (set, split), name, &progress, |sample| {
+    let images = |baseline: Baseline| {
+        move |sample: &TruthSample| {
             let image = match input {
                 IntrinsicInput::Diffuse => {
                     need(sample, "image without highlights", &sample.diffuse)
                 }
                 IntrinsicInput::Original => need(sample, "image", &sample.image),
             };
-            let mask = object(sample);
-            score(sample, &baseline.decompose(sample, image?, &mask)?, &mask)
-        })?;
-    }
-    for found in predictions {
-        add_method(
-            &mut table,
-            (set, split),
-            &found.name(),
-            &progress,
-            |sample| {
-                let read = |part| found.colour(&sample.name, part, sample.extent());
-                // What has no ground truth need not be there.
-                let shading = sample.shading.as_ref().map(|_| read("shading"));
-                let found = IntrinsicImages {
-                    albedo: read("albedo")?,
-                    shading: shading.transpose()?,
-                };
-                score(sample, &found, &object(sample))
-            },
-        )?;
-    }
-    Ok(table)
+            baseline.decompose(sample, image?, &object(sample))
+        }
+    };
+    let baselines = baselines.into_iter();
+    let baselines = baselines.map(|(baseline, name)| (name, Box::new(images(baseline)) as _));
+    evaluate(
+        table,
+        (set, split),
+        baselines.collect(),
+        predictions,
+        |found, sample| {
+            let (name, extent) = (&sample.name, sample.extent());
+            let shading = sample.shading.as_ref();
+            let shading = shading.map(|_| found.colour(name, "shading", extent));
+            Ok(IntrinsicImages {
+                albedo: found.colour(name, "albedo", extent)?,
+                shading: shading.transpose()?,
+            })
+        },
+        score,
+        progress,
+    )
 }
 
 fn notes(input: IntrinsicInput) -> Vec<String> {
@@ -182,20 +179,22 @@ fn notes(input: IntrinsicInput) -> Vec<String> {
     ]
 }
 
-fn score(
-    sample: &TruthSample,
-    found: &IntrinsicImages,
-    mask: &[bool],
-) -> Result<Vec<Scored>, EvalError> {
-    let albedo = need(sample, "albedo", &sample.albedo)?;
+fn score(sample: &TruthSample, found: &IntrinsicImages) -> Result<Vec<ScoreLine>, EvalError> {
+    let (albedo, mask) = (need(sample, "albedo", &sample.albedo)?, object(sample));
     let mut lines = Vec::new();
     for convention in Convention::ALL {
         let compare = |truth: &Rgb<Linear>, estimate: &Rgb<Linear>| {
             let (truth, estimate) = (truth.planes().planes(), estimate.planes().planes());
             let extent = sample.extent();
-            let error =
-                intrinsic_error(convention, extent, &truth, &estimate, mask, Windows::GROSSE);
-            measured(sample, error)
+            let error = intrinsic_error(
+                convention,
+                extent,
+                &truth,
+                &estimate,
+                &mask,
+                Windows::GROSSE,
+            );
+            error.map_err(EvalError::sample(&sample.name, NOT_MEASURED))
         };
         let of_albedo = compare(albedo, &found.albedo)?;
         let mut parts = vec![("albedo", of_albedo)];
@@ -208,13 +207,12 @@ fn score(
             parts.extend([("shading", of_shading), ("mean", mean)]);
         }
         for (part, error) in parts {
-            lines.push(Scored {
+            lines.push(ScoreLine::of_image(
                 part,
-                measures: vec![("SMSE", error.smse), ("LMSE", error.lmse)],
-                colour: values_of(convention),
-                scale: convention.fit().name(),
-                mask: MaskRule::Object,
-            });
+                &[("SMSE", error.smse), ("LMSE", error.lmse)],
+                (values_of(convention), convention.fit()),
+                MaskRule::Object,
+            ));
         }
     }
     Ok(lines)

@@ -1,19 +1,19 @@
 //! Light of single images: the table on Light-Net.
 
 use super::normals::known;
-use super::run::{Scored, UNLIT, add_method, largest, measured, need};
-use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use super::run::{Estimate, UNLIT, compared, evaluate, largest, need};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreLine, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{Direction, Order, ShLight};
-use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit};
+use relight_core::metrics::{SSIM_WINDOW, ScaleFit};
 use relight_core::reader::{TruthSample, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 
 /// The light of order 2 that is nearest to the true shading on the true normals.
-fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
+fn fitted(sample: &TruthSample) -> Result<ShLight, EvalError> {
     let normals = need(sample, "normals", &sample.normals)?;
     let shading = need(sample, "shading", &sample.shading)?;
-    let light = fit_light(normals, shading, known, 0.0);
+    let light = fit_light(normals, shading, &known(sample, normals), 0.0);
     light.map_err(EvalError::sample(&sample.name, UNLIT))
 }
 
@@ -40,82 +40,61 @@ pub fn evaluate_light(
          if one has no direction"
             .to_owned(),
     ];
-    let mut table = ScoreTable::new("light", notes);
-    let steps = (2 + predictions.len()) * set.names().len();
-    let progress = || progress(steps);
-    let mut add = |name: &str, light: &LightOf<'_>| {
-        add_method(&mut table, (set, split), name, &progress, |sample| {
-            let normals = need(sample, "normals", &sample.normals)?;
-            let known = known(sample, normals);
-            let light = light(sample, &known)?;
-            let found = DiffuseLayer::new(&light, form).shading(normals);
-            let mut lines = score(sample, &found, &known)?;
-            lines.push(direction_score(sample, &light, &known)?);
-            Ok(lines)
-        })
-    };
-    add("even light", &|_, _| {
-        Ok(ShLight::even(Order::TWO, [1.0; 3]))
-    })?;
-    add("oracle: fitted to the ground truth", &fitted)?;
-    for found in predictions {
-        add(&found.name(), &|sample, _| found.light(&sample.name))?;
-    }
-    Ok(table)
+    let even = |_: &TruthSample| Ok(ShLight::even(Order::TWO, [1.0; 3]));
+    let baselines: Vec<(&str, Estimate<'_, ShLight>)> = vec![
+        ("even light", Box::new(even)),
+        ("oracle: fitted to the ground truth", Box::new(fitted)),
+    ];
+    evaluate(
+        ScoreTable::new("light", notes),
+        (set, split),
+        baselines,
+        predictions,
+        |found, sample| found.light(&sample.name),
+        |sample, light| score(sample, light, form),
+        progress,
+    )
 }
-
-/// The light of a sample, whose normals are known in these pixels.
-type LightOf<'a> = dyn Fn(&TruthSample, &[bool]) -> Result<ShLight, EvalError> + Sync + 'a;
 
 fn score(
     sample: &TruthSample,
-    found: &Rgb<Linear>,
-    known: &[bool],
-) -> Result<Vec<Scored>, EvalError> {
-    let truth = to_maximum_one(need(sample, "shading", &sample.shading)?, known);
-    let found = to_maximum_one(found, known);
-    let (truth, found) = (truth.planes().planes(), found.planes().planes());
-    let pair = measured(
-        sample,
-        Comparison::new(sample.extent(), &truth, &found, known),
-    )?;
-    let ssim = measured(sample, pair.ssim())?;
-    let line = |measures, scale: ScaleFit| Scored {
-        part: "shading",
-        measures,
-        colour: "linear RGB, both maxima 1",
-        scale: scale.name(),
-        mask: MaskRule::Known,
+    light: &ShLight,
+    form: DiffuseForm,
+) -> Result<Vec<ScoreLine>, EvalError> {
+    let normals = need(sample, "normals", &sample.normals)?;
+    let known = known(sample, normals);
+    let found = DiffuseLayer::new(light, form).shading(normals);
+    let truth = to_maximum_one(need(sample, "shading", &sample.shading)?, &known);
+    let found = to_maximum_one(&found, &known);
+    let [mse, smse, ssim] = compared(&sample.name, truth.planes(), found.planes(), &known)?;
+    let line = |part, measures: &[(&str, f64)], colour, fit| {
+        ScoreLine::of_image(part, measures, (colour, fit), MaskRule::Known)
     };
+    let (colour, none) = ("linear RGB, both maxima 1", ScaleFit::None);
+    let degrees = direction_error(sample, light)?;
     Ok(vec![
+        line("shading", &[("MSE", mse), ("SSIM", ssim)], colour, none),
+        line("shading", &[("SMSE", smse)], colour, ScaleFit::Image),
         line(
-            vec![("MSE", pair.mse(ScaleFit::None)), ("SSIM", ssim)],
-            ScaleFit::None,
+            "direction",
+            &[("degrees", degrees)],
+            "mean of the channels",
+            none,
         ),
-        line(vec![("SMSE", pair.mse(ScaleFit::Image))], ScaleFit::Image),
     ])
 }
 
-fn direction_score(
-    sample: &TruthSample,
-    found: &ShLight,
-    known: &[bool],
-) -> Result<Scored, EvalError> {
+/// The angle between the directions of light and true light, degrees.
+fn direction_error(sample: &TruthSample, found: &ShLight) -> Result<f64, EvalError> {
     let truth = match &sample.light {
         Some(light) => light.clone(),
-        None => fitted(sample, known)?,
+        None => fitted(sample)?,
     };
     let cosine = match (direction(&truth), direction(found)) {
         (Some(truth), Some(found)) => truth.dot(found),
         _ => 0.0,
     };
-    Ok(Scored {
-        part: "direction",
-        measures: vec![("degrees", cosine.clamp(-1.0, 1.0).acos().to_degrees())],
-        colour: "mean of the channels",
-        scale: ScaleFit::None.name(),
-        mask: MaskRule::Known,
-    })
+    Ok(cosine.clamp(-1.0, 1.0).acos().to_degrees())
 }
 
 /// The main direction of the light: its band 1, averaged over the channels. `None` for even light.

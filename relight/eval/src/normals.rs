@@ -1,12 +1,10 @@
 //! Normals of single images: the table on the data of Janner et al.
 
-use super::run::{Scored, add_method, cut_out, measured, need, object};
-use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
+use super::run::{NOT_MEASURED, compared, cut_out, evaluate, need, object};
+use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreLine, ScoreTable};
 use relight_core::image::Planes;
 use relight_core::light::{Normals, YUp};
-use relight_core::metrics::{
-    AngularError, Comparison, SSIM_WINDOW, ScaleFit, angular_error, dssim,
-};
+use relight_core::metrics::{AngularError, SSIM_WINDOW, ScaleFit, angular_error, dssim};
 use relight_core::reader::{TruthSample, TruthSet};
 
 /// MSE and DSSIM of normal maps, and the angles between normals, for normals that all point to the viewer and for each
@@ -28,27 +26,22 @@ pub fn evaluate_normals(
         "angles: degrees; within: the fraction of pixels with an angle of at most so much"
             .to_owned(),
     ];
-    let mut table = ScoreTable::new("normals", notes);
-    let steps = (1 + predictions.len()) * set.names().len();
-    let progress = || progress(steps);
-    let viewer = "all towards the viewer";
-    add_method(&mut table, (set, split), viewer, &progress, |sample| {
-        let to_viewer = Planes::filled(sample.extent(), [0.0, 0.0, 1.0]);
-        score(sample, &Normals::new(to_viewer))
-    })?;
-    for found in predictions {
-        add_method(
-            &mut table,
-            (set, split),
-            &found.name(),
-            &progress,
-            |sample| score(sample, &found.normals(&sample.name, sample.extent())?),
-        )?;
-    }
-    Ok(table)
+    let to_viewer = |sample: &TruthSample| {
+        let planes = Planes::filled(sample.extent(), [0.0, 0.0, 1.0]);
+        Ok(Normals::new(planes))
+    };
+    evaluate(
+        ScoreTable::new("normals", notes),
+        (set, split),
+        vec![("all towards the viewer", Box::new(to_viewer))],
+        predictions,
+        |found, sample| found.normals(&sample.name, sample.extent()),
+        score,
+        progress,
+    )
 }
 
-fn score(sample: &TruthSample, found: &Normals<YUp>) -> Result<Vec<Scored>, EvalError> {
+fn score(sample: &TruthSample, found: &Normals<YUp>) -> Result<Vec<ScoreLine>, EvalError> {
     let truth = need(sample, "normals", &sample.normals)?;
     let known = known(sample, truth);
     let whole = vec![true; known.len()];
@@ -58,28 +51,18 @@ fn score(sample: &TruthSample, found: &Normals<YUp>) -> Result<Vec<Scored>, Eval
         found.planes().planes(),
         &known,
     );
-    let angles = measured(sample, angles)?;
+    let angles = angles.map_err(EvalError::sample(&sample.name, NOT_MEASURED))?;
     let (truth, found) = (truth.to_colours(), found.to_colours());
     let (truth, found) = (cut_out(&truth, &known), cut_out(&found, &known));
     let mut lines = Vec::new();
     for (mask, rule) in [(&known, MaskRule::Known), (&whole, MaskRule::WholeImage)] {
-        let (truth, found) = (truth.planes(), found.planes());
-        let pair = measured(
-            sample,
-            Comparison::new(sample.extent(), &truth, &found, mask),
-        )?;
-        let ssim = measured(sample, pair.ssim())?;
-        let mut measures = vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))];
+        let [mse, _, ssim] = compared(&sample.name, &truth, &found, mask)?;
+        let mut measures = vec![("MSE", mse), ("DSSIM", dssim(ssim))];
         if rule == MaskRule::Known {
             measures.extend(named(&angles));
         }
-        lines.push(Scored {
-            part: "normals",
-            measures,
-            colour: "(n + 1) / 2",
-            scale: ScaleFit::None.name(),
-            mask: rule,
-        });
+        let values = ("(n + 1) / 2", ScaleFit::None);
+        lines.push(ScoreLine::of_image("normals", &measures, values, rule));
     }
     Ok(lines)
 }

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::{EvalError, ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
+use super::{EvalError, ImageScores, Measured, Predictions, ScoreLine, ScoreTable};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::metrics::MetricError;
+use relight_core::metrics::{Comparison, MetricError, ScaleFit};
 use relight_core::parallel;
 use relight_core::reader::{TruthSample, TruthSet};
 
@@ -16,33 +16,39 @@ pub(super) const NOT_MEASURED: &str = "cannot be measured";
 /// The same if no light can be fitted.
 pub(super) const UNLIT: &str = "cannot be lit: no light can be fitted to it";
 
-/// A measure of one image that becomes part of a line.
-pub(super) struct Scored {
-    /// What was compared.
-    pub(super) part: &'static str,
-    /// The measures, in the table's order.
-    pub(super) measures: Vec<(&'static str, f64)>,
-    pub(super) colour: &'static str,
-    pub(super) scale: &'static str,
-    pub(super) mask: MaskRule,
-}
+/// What a baseline estimates of a sample.
+pub(super) type Estimate<'a, E> = Box<dyn Fn(&TruthSample) -> Result<E, EvalError> + Sync + 'a>;
 
-/// Measures each image of the set with `score`, which gives the same lines for each, and adds the
-/// lines of means to the table.
-pub(super) fn add_method(
-    table: &mut ScoreTable,
+/// Measures the estimates of each baseline and of each prediction on each image of the set by `score`, which gives the same
+/// lines for each, and adds the lines of means to the table.
+pub(super) fn evaluate<'a, E>(
+    mut table: ScoreTable,
     (set, split): (&TruthSet, &str),
-    method: &str,
-    progress: &(dyn Fn() + Sync),
-    score: impl Fn(&TruthSample) -> Result<Vec<Scored>, EvalError> + Sync,
-) -> Result<(), EvalError> {
+    baselines: Vec<(&str, Estimate<'a, E>)>,
+    predictions: &'a [Predictions],
+    predicted: impl Fn(&Predictions, &TruthSample) -> Result<E, EvalError> + Sync + Copy + 'a,
+    score: impl Fn(&TruthSample, &E) -> Result<Vec<ScoreLine>, EvalError> + Sync,
+    progress: EvalProgress<'_>,
+) -> Result<ScoreTable, EvalError> {
     let names: Vec<&str> = set.names().collect();
+    let steps = (baselines.len() + predictions.len()) * names.len();
+    let progress = || progress(steps);
+    let baselines = baselines
+        .into_iter()
+        .map(|(name, of)| (name.to_owned(), of));
+    let predictions = predictions.iter().map(|found| {
+        let of: Estimate<'a, E> = Box::new(move |sample| predicted(found, sample));
+        (found.name(), of)
+    });
     let name = |index: usize| names[index].to_owned();
-    let scored = each(names.len(), progress, name, |index| {
-        score(&set.load(index)?)
-    })?;
-    add_lines(table, method, split, 1, scored);
-    Ok(())
+    for (method, estimate) in baselines.chain(predictions) {
+        let scored = each(names.len(), &progress, name, |index| {
+            let sample = set.load(index)?;
+            score(&sample, &estimate(&sample)?)
+        })?;
+        add_lines(&mut table, &method, split, 1, scored);
+    }
+    Ok(table)
 }
 
 /// The results of `work` on `count` samples, in parallel, with their names. A panic is an error that names the sample.
@@ -73,7 +79,7 @@ pub(super) fn add_lines(
     method: &str,
     split: &str,
     images: usize,
-    scored: Vec<(String, Vec<Scored>)>,
+    scored: Vec<(String, Vec<ScoreLine>)>,
 ) {
     table.lines.extend(lines(method, split, images, &scored));
     table
@@ -89,7 +95,7 @@ fn lines(
     method: &str,
     split: &str,
     each: usize,
-    samples: &[(String, Vec<Scored>)],
+    samples: &[(String, Vec<ScoreLine>)],
 ) -> Vec<ScoreLine> {
     let Some((_, first)) = samples.first() else {
         return Vec::new();
@@ -97,32 +103,45 @@ fn lines(
     let mean = |line: usize, measure: usize| {
         let values = samples
             .iter()
-            .map(|(_, scored)| scored[line].measures[measure].1);
+            .map(|(_, scored)| scored[line].measures[measure].value);
         values.sum::<f64>() / samples.len() as f64
     };
-    let line = |(at, scored): (usize, &Scored)| ScoreLine {
-        method: method.to_owned(),
-        part: scored.part.to_owned(),
-        measures: (0..scored.measures.len())
-            .map(|measure| Measured {
-                name: scored.measures[measure].0.to_owned(),
-                value: mean(at, measure),
-            })
-            .collect(),
-        colour: scored.colour.to_owned(),
-        scale: scored.scale.to_owned(),
-        mask: scored.mask,
-        images: samples.len() * each,
-        split: split.to_owned(),
+    let line = |(at, scored): (usize, &ScoreLine)| {
+        let mut line = scored.clone();
+        for (measure, measured) in line.measures.iter_mut().enumerate() {
+            measured.value = mean(at, measure);
+        }
+        method.clone_into(&mut line.method);
+        split.clone_into(&mut line.split);
+        line.images = samples.len() * each;
+        line
     };
     first.iter().enumerate().map(line).collect()
 }
 
-fn named_by_part(scored: &Scored) -> impl Iterator<Item = Measured> {
-    scored.measures.iter().map(|(name, value)| Measured {
-        name: format!("{} {name}, {}, {}", scored.part, scored.scale, scored.mask),
-        value: *value,
+fn named_by_part(scored: &ScoreLine) -> impl Iterator<Item = Measured> {
+    scored.measures.iter().map(|one| Measured {
+        name: format!(
+            "{} {}, {}, {}",
+            scored.part, one.name, scored.scale, scored.mask
+        ),
+        value: one.value,
     })
+}
+
+/// The squared error of an estimate, as it is and after the best scale, and its structural similarity.
+pub(super) fn compared(
+    sample: &str,
+    truth: &Planes<3>,
+    found: &Planes<3>,
+    mask: &[bool],
+) -> Result<[f64; 3], EvalError> {
+    let compared = || {
+        let pair = Comparison::new(truth.extent(), &truth.planes(), &found.planes(), mask)?;
+        let ssim = pair.ssim()?;
+        Ok([pair.mse(ScaleFit::None), pair.mse(ScaleFit::Image), ssim])
+    };
+    compared().map_err(|fault: MetricError| EvalError::sample(sample, NOT_MEASURED)(fault))
 }
 
 /// The part of a sample that the protocol needs.
@@ -137,14 +156,6 @@ pub(super) fn need<'a, T>(
             "the ground truth has no {part} of {name}, which this protocol needs"
         ))
     })
-}
-
-/// The measurement of a sample, with the sample's name in an error.
-pub(super) fn measured<T>(
-    sample: &TruthSample,
-    result: Result<T, MetricError>,
-) -> Result<T, EvalError> {
-    result.map_err(EvalError::sample(&sample.name, NOT_MEASURED))
 }
 
 /// Where the mask is 1.

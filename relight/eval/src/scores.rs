@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use relight_core::metrics::ScaleFit;
 use serde::Serialize;
 
 /// Which pixels a measure is taken over.
@@ -54,6 +55,31 @@ pub struct ScoreLine {
     pub images: usize,
     /// The data set, and its part.
     pub split: String,
+}
+
+impl ScoreLine {
+    /// Of one image, of a method and split that are not named yet.
+    pub(super) fn of_image(
+        part: &str,
+        measures: &[(&str, f64)],
+        (colour, fit): (&str, ScaleFit),
+        mask: MaskRule,
+    ) -> Self {
+        let measured = |&(name, value): &(&str, f64)| Measured {
+            name: name.to_owned(),
+            value,
+        };
+        Self {
+            method: String::new(),
+            part: part.to_owned(),
+            measures: measures.iter().map(measured).collect(),
+            colour: colour.to_owned(),
+            scale: fit.name().to_owned(),
+            mask,
+            images: 1,
+            split: String::new(),
+        }
+    }
 }
 
 /// What a method scored on one image.

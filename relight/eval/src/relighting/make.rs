@@ -29,9 +29,10 @@ const LIGHT_STREAM: u64 = 101;
 const OBJECT_STREAM: u64 = 102;
 
 /// The settings of an evaluation set. The same recipe and library make the same set.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RelightingRecipe {
     /// How many objects; the paper has 100.
+    #[serde(skip)]
     pub objects: usize,
     /// Under how many lights each; the paper has 30.
     pub lights: usize,
@@ -101,10 +102,8 @@ impl RelightingRecipe {
 /// The inputs of all objects of a folder.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Origin {
-    lights: usize,
-    size: u32,
-    seed: u64,
-    shadows: bool,
+    #[serde(flatten)]
+    recipe: RelightingRecipe,
     meshes: Vec<String>,
     panoramas: Vec<String>,
 }
@@ -115,10 +114,11 @@ impl Origin {
 
     fn new(recipe: &RelightingRecipe, library: &Library) -> Self {
         Self {
-            lights: recipe.lights,
-            size: recipe.size,
-            seed: recipe.seed,
-            shadows: recipe.shadows,
+            // More objects can be added later.
+            recipe: RelightingRecipe {
+                objects: 0,
+                ..recipe.clone()
+            },
             meshes: library.mesh_names(),
             panoramas: library.panoramas.names(),
         }

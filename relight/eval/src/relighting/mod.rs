@@ -10,10 +10,9 @@ pub use make::{RelightingRecipe, make_relighting};
 pub use method::RelightMethod;
 pub use set::RelightingSet;
 
-use super::run::{NOT_MEASURED, Scored, add_lines, each};
-use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
-use relight_core::image::Planes;
-use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit, dssim};
+use super::run::{add_lines, compared, each};
+use super::{EvalError, EvalProgress, MaskRule, ScoreLine, ScoreTable};
+use relight_core::metrics::{SSIM_WINDOW, ScaleFit, dssim};
 use set::{Object, Part, object_folder};
 
 /// MSE and DSSIM of relit images, for each method: the mean over all objects and target lights.
@@ -50,7 +49,7 @@ fn score(
     set: &RelightingSet,
     object: &Object,
     method: &RelightMethod<'_>,
-) -> Result<Vec<Scored>, EvalError> {
+) -> Result<Vec<ScoreLine>, EvalError> {
     let whole = vec![true; object.mask.len()];
     let rules = [
         (&object.mask, MaskRule::Object),
@@ -64,35 +63,20 @@ fn score(
             let truth = set.image(object, light, part)?;
             let found = relight(light)?;
             for ((mask, _), sum) in rules.iter().zip(&mut sums) {
-                let (mse, dssim) = compare(object, &truth, &found, mask)?;
+                let [mse, _, ssim] = compared(&object.name, &truth, &found, mask)?;
                 sum.0 += mse;
-                sum.1 += dssim;
+                sum.1 += dssim(ssim);
             }
         }
         let count = object.targets(set).count().max(1) as f64;
         for ((_, rule), sum) in rules.iter().zip(sums) {
-            lines.push(Scored {
-                part: part.name(),
-                measures: vec![("MSE", sum.0 / count), ("DSSIM", sum.1 / count)],
-                colour: "sRGB, clipped to 0..1",
-                scale: ScaleFit::None.name(),
-                mask: *rule,
-            });
+            lines.push(ScoreLine::of_image(
+                part.name(),
+                &[("MSE", sum.0 / count), ("DSSIM", sum.1 / count)],
+                ("sRGB, clipped to 0..1", ScaleFit::None),
+                *rule,
+            ));
         }
     }
     Ok(lines)
-}
-
-fn compare(
-    object: &Object,
-    truth: &Planes<3>,
-    found: &Planes<3>,
-    mask: &[bool],
-) -> Result<(f64, f64), EvalError> {
-    let (truth_planes, found_planes) = (truth.planes(), found.planes());
-    let pair = Comparison::new(truth.extent(), &truth_planes, &found_planes, mask);
-    let failed = || EvalError::sample(&object.name, NOT_MEASURED);
-    let pair = pair.map_err(failed())?;
-    let ssim = pair.ssim().map_err(failed())?;
-    Ok((pair.mse(ScaleFit::None), dssim(ssim)))
 }
