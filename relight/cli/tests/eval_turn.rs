@@ -56,12 +56,15 @@ fn a_turn_is_scored_by_each_method() {
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("mean") && text.lines().count() > 3, "{text}");
     let json: serde_json::Value = serde_json::from_slice(&fs::read(table).unwrap()).unwrap();
-    let [unknown, known] = [0, 1].map(|line: usize| json["lines"][line]["turns"][0].clone());
+    let measure = |line: usize| json["lines"][line]["measures"][0].clone();
     // Normals at random are 57 degrees off.
-    assert!(unknown["mean_deg"].as_f64().unwrap() < 35.0, "{unknown}");
-    for score in [&unknown, &known] {
-        assert!(score["albedo"].is_number() && score["verdict"].is_string());
+    for (line, method) in [(0, "light unknown"), (2, "light known")] {
+        assert_eq!(json["lines"][line]["method"], method);
+        let mean = measure(line);
+        assert!(mean["value"].as_f64().unwrap() < 35.0, "{mean}");
+        assert_eq!(measure(line + 1)["name"], "albedo");
     }
+    assert_eq!(json["images"].as_array().unwrap().len(), 2);
 }
 
 /// What `relight turn` writes and warns of with these options.

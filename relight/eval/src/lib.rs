@@ -51,4 +51,4 @@ pub use relighting::{
 };
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
-pub use turns::{TurnScores, evaluate_turns};
+pub use turns::evaluate_turns;

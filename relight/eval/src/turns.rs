@@ -1,10 +1,10 @@
 //! Normals and albedo of whole turns in rooms that are not known, on synthetic turns with their ground truth.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-use relight_core::image::{Linear, Rgb, Transfer};
+use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::metrics::{Comparison, MetricError, ScaleFit, angle};
 use relight_synth::SequenceDescription;
 use relight_turn::{
     Elevation, MaterialKind, SolvedTurn, TurnError, TurnLight, TurnNetworks, TurnOptions,
@@ -13,49 +13,27 @@ use relight_turn::{
 use relit_data::rig::RotationDirection;
 use relit_data::shard::Dataset;
 use relit_data::statistics::median;
-use serde::Serialize;
 
 use super::predictions::{NO_SET, read_light};
-use super::{EvalError, EvalProgress};
+use super::run::NOT_MEASURED;
+use super::{EvalError, EvalProgress, ImageScores, MaskRule, ScoreLine, ScoreTable};
 
 /// Expected errors for which the pixels within them are counted, degrees.
-const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
+const LIMITS: [(f64, &str); 3] = [
+    (10.0, "within 10"),
+    (20.0, "within 20"),
+    (30.0, "within 30"),
+];
 
-/// The methods for turns, as named in the table, and whether they get the true light.
-const METHODS: [(&str, bool); 2] = [("light unknown", false), ("light known", true)];
-
-/// The errors of a turn by a method.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The errors of a turn.
 struct TurnScore {
-    turn: String,
-    /// Mean and median angle between found and true normals, degrees.
-    mean_deg: f64,
-    median_deg: f64,
+    /// Of its normals, degrees: mean and median of the angles, the mean of what is expected of the pixels, and what is expected
+    /// of the turn; 1 if the verdict is good.
+    normals: [(&'static str, f64); 5],
+    /// For the pixels that are expected to be off by at most each limit: how many there are, and how many of them are.
+    kept: [[usize; 2]; 3],
     /// Squared error of the albedo over its energy, after one scale a channel.
     albedo: f64,
-    /// For the pixels that are expected to be off by at most 10, 20 and 30 degrees: how many there are, and how many
-    /// of them are.
-    kept: [[usize; 2]; 3],
-    /// Mean and median of what is expected of the pixels, degrees.
-    expected_mean_deg: f64,
-    expected_deg: f64,
-    /// The verdict on the turn.
-    verdict: TurnVerdict,
-}
-
-/// A method on all turns.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct TurnLine {
-    method: &'static str,
-    turns: Vec<TurnScore>,
-}
-
-/// All methods on all turns.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TurnScores {
-    /// What the turns are called.
-    split: String,
-    lines: [TurnLine; METHODS.len()],
 }
 
 /// Turns in the layout of `relight synth sequences`, with their ground truth.
@@ -111,8 +89,8 @@ impl TurnSet {
     }
 }
 
-/// Solves every turn of a data set of `relight synth sequences` by every method; `split` is what the table calls them. `progress`
-/// is called for each turn and method.
+/// Solves every turn of a data set of `relight synth sequences`, in unknown and in known light; `split` is what the table calls
+/// them. `progress` is called for each turn and method.
 ///
 /// # Errors
 /// If a turn or its ground truth cannot be read, or cannot be solved.
@@ -121,26 +99,73 @@ pub fn evaluate_turns(
     split: &str,
     networks: &TurnNetworks,
     progress: EvalProgress<'_>,
-) -> Result<TurnScores, EvalError> {
+) -> Result<ScoreTable, EvalError> {
     let set = TurnSet::open(folder)?;
-    let mut lines = METHODS.map(|(method, _)| TurnLine {
-        method,
-        turns: Vec::new(),
-    });
-    let steps = METHODS.len() * set.turns.len();
-    for number in 0..set.turns.len() {
-        let truth = set.read(number)?;
-        for (line, (_, knows_light)) in lines.iter_mut().zip(METHODS) {
+    let notes = "normals: degrees, means over the turns, ±: standard error; expected: the predicted error of the pixels, turn expected: \
+                 of the turn; within: the fraction of the pixels expected within so many degrees that are; good: of the \
+                 turns with this verdict; albedo: squared error over energy";
+    let mut table = ScoreTable::new("turns", vec![notes.to_owned()]);
+    let methods = [("light unknown", false), ("light known", true)];
+    let steps = methods.len() * set.turns.len();
+    for (method, knows_light) in methods {
+        let mut scores = Vec::new();
+        for number in 0..set.turns.len() {
+            let truth = set.read(number)?;
             let solved = truth.solve(knows_light, networks)?;
-            line.turns
-                .push(score(&set.turns[number].0, &truth, &solved));
+            let image = &set.turns[number].0;
+            let score = score(&truth, &solved).map_err(EvalError::sample(image, NOT_MEASURED))?;
+            let lines = lines(std::slice::from_ref(&score));
+            table.images.push(ImageScores {
+                method: method.to_owned(),
+                image: image.clone(),
+                measures: lines.into_iter().flat_map(|line| line.measures).collect(),
+            });
+            scores.push(score);
             progress(steps);
         }
+        table.lines.extend(lines(&scores).map(|line| ScoreLine {
+            method: method.to_owned(),
+            images: scores.len(),
+            split: split.to_owned(),
+            ..line
+        }));
     }
-    Ok(TurnScores {
-        split: split.to_owned(),
-        lines,
-    })
+    Ok(table)
+}
+
+/// The means over turns.
+fn lines(turns: &[TurnScore]) -> [ScoreLine; 2] {
+    let count = turns.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&TurnScore) -> f64| turns.iter().map(of).sum::<f64>() / count;
+    let normals = |at: usize| mean(&|turn| turn.normals[at].1);
+    let error = |at: usize| {
+        let square = mean(&|turn| (turn.normals[at].1 - normals(at)).powi(2));
+        (square / (count - 1.0).max(1.0)).sqrt()
+    };
+    let mut measures: Vec<(&str, f64)> = Vec::new();
+    for at in 0..turns.first().map_or(0, |turn| turn.normals.len()) {
+        measures.push((turns[0].normals[at].0, normals(at)));
+        match at {
+            0 => measures.push(("± mean", error(0))),
+            1 => measures.push(("± median", error(1))),
+            _ => {}
+        }
+    }
+    for (at, (_, name)) in LIMITS.iter().enumerate() {
+        let sum = |k: usize| turns.iter().map(|turn| turn.kept[at][k]).sum::<usize>() as f64;
+        // Of no pixels, there is no fraction.
+        if sum(0) > 0.0 {
+            measures.push((name, sum(1) / sum(0)));
+        }
+    }
+    let albedo = [("albedo", mean(&|turn| turn.albedo))];
+    let line = |part, measures: &[(&str, f64)], values| {
+        ScoreLine::of_image(part, measures, values, MaskRule::Known)
+    };
+    [
+        line("normals", &measures, ("degrees", ScaleFit::None)),
+        line("albedo", &albedo, ("linear RGB", ScaleFit::Channel)),
+    ]
 }
 
 impl TrueTurn {
@@ -159,137 +184,59 @@ impl TrueTurn {
     }
 }
 
-fn score(name: &str, truth: &TrueTurn, solved: &SolvedTurn) -> TurnScore {
+fn score(truth: &TrueTurn, solved: &SolvedTurn) -> Result<TurnScore, MetricError> {
     let (curves, solution) = (&solved.turn.curves, &solved.solution);
     let mask = &solved.turn.mask;
-    let true_normals = truth.normals.planes().planes();
-    let inside: Vec<usize> = (0..mask.extent().pixels())
-        .filter(|&at| mask.plane(0)[at] >= 0.5)
-        .filter(|&at| true_normals.iter().any(|plane| plane[at] != 0.0))
-        .collect();
-    let vectors = |normals: &Normals<YUp>| -> Vec<[f64; 3]> {
-        let planes = normals.planes().planes();
-        let at = |&at: &usize| planes.map(|plane| f64::from(plane[at]));
-        inside.iter().map(at).collect()
-    };
-    let (right, found) = (vectors(&truth.normals), vectors(&solution.normals(curves)));
-    let errors: Vec<f64> = right
-        .iter()
-        .zip(&found)
-        .map(|(a, b)| angle_deg(*a, *b))
+    let (right, found) = (truth.normals.planes().planes(), solution.normals(curves));
+    let found = found.planes().planes();
+    let inside: Vec<bool> = (0..mask.extent().pixels())
+        .map(|at| mask.plane(0)[at] >= 0.5 && right.iter().any(|plane| plane[at] != 0.0))
         .collect();
     let expected = solution.expected_errors(curves);
-    let expected: Vec<f64> = (inside.iter())
-        .map(|&at| f64::from(expected.plane(0)[at]))
+    // Of each pixel what is expected, and the error.
+    let pixels: Vec<(f64, f64)> = (0..inside.len())
+        .filter(|&at| inside[at])
+        .map(|at| {
+            let [right, found] = [right, found].map(|of| of.map(|plane| f64::from(plane[at])));
+            let expected = f64::from(expected.plane(0)[at]);
+            (expected, angle(right, found).to_degrees())
+        })
         .collect();
-    let pairs = || expected.iter().copied().zip(errors.iter().copied());
-    let kept = LIMITS_DEG.map(|limit| {
-        let chosen = pairs().filter(|(expected, _)| *expected <= limit);
+    let kept = LIMITS.map(|(limit, _)| {
+        let chosen = pixels.iter().filter(|(expected, _)| *expected <= limit);
         chosen.fold([0, 0], |[all, kept], (_, error)| {
-            [all + 1, kept + usize::from(error <= limit)]
+            [all + 1, kept + usize::from(*error <= limit)]
         })
     });
-    TurnScore {
-        turn: name.to_owned(),
-        mean_deg: mean(&errors),
-        median_deg: median(errors.iter().copied()).unwrap_or(0.0),
-        albedo: albedo_error(&truth.albedo, &solution.albedo(curves), &inside),
+    let mean = |of: fn(&(f64, f64)) -> f64| {
+        pixels.iter().map(of).sum::<f64>() / pixels.len().max(1) as f64
+    };
+    let is_good = solution.verdict() == TurnVerdict::Good;
+    Ok(TurnScore {
+        normals: [
+            ("mean", mean(|pixel| pixel.1)),
+            (
+                "median",
+                median(pixels.iter().map(|pixel| pixel.1)).unwrap_or(0.0),
+            ),
+            ("expected", mean(|pixel| pixel.0)),
+            ("turn expected", solution.expected_error_deg()),
+            ("good", f64::from(u8::from(is_good))),
+        ],
         kept,
-        expected_mean_deg: mean(&expected),
-        expected_deg: solution.expected_error_deg(),
-        verdict: solution.verdict(),
-    }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let cosine = dot(a, b) / (dot(a, a) * dot(b, b)).sqrt().max(1e-12);
-    cosine.clamp(-1.0, 1.0).acos().to_degrees()
+        albedo: albedo_error(&truth.albedo, &solution.albedo(curves), &inside)?,
+    })
 }
 
 /// The squared error over the energy, each channel of the answer scaled to fit best.
-fn albedo_error(truth: &Rgb<Linear>, found: &Rgb<Linear>, inside: &[usize]) -> f64 {
-    let (mut error, mut energy) = (0.0, 0.0);
-    for (a, b) in truth
-        .planes()
-        .planes()
-        .into_iter()
-        .zip(found.planes().planes())
-    {
-        let pairs = || {
-            inside
-                .iter()
-                .map(|&at| (f64::from(a[at]), f64::from(b[at])))
-        };
-        let product: f64 = pairs().map(|(a, b)| a * b).sum();
-        let square: f64 = pairs().map(|(_, b)| b * b).sum();
-        let scale = product / square.max(1e-12);
-        error += pairs().map(|(a, b)| (a - scale * b).powi(2)).sum::<f64>();
-        energy += pairs().map(|(a, _)| a * a).sum::<f64>();
-    }
-    error / energy.max(1e-12)
-}
-
-impl TurnLine {
-    /// The mean of a figure over the turns, and its standard error.
-    fn mean_of(&self, figure: impl Fn(&TurnScore) -> f64) -> (f64, f64) {
-        let values: Vec<f64> = self.turns.iter().map(figure).collect();
-        let mean = mean(&values);
-        let count = values.len() as f64;
-        let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        let error = (square / (count - 1.0).max(1.0) / count.max(1.0)).sqrt();
-        (mean, error)
-    }
-
-    /// The part of the pixels expected within a limit that are.
-    fn kept(&self, limit: usize) -> Option<f64> {
-        let sum = |k: usize| {
-            self.turns
-                .iter()
-                .map(|turn| turn.kept[limit][k])
-                .sum::<usize>()
-        };
-        (sum(0) > 0).then(|| sum(1) as f64 / sum(0) as f64)
-    }
-}
-
-impl fmt::Display for TurnScores {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let turns = self.lines.first().map_or(0, |line| line.turns.len());
-        writeln!(f, "turns, {turns} of {}", self.split)?;
-        writeln!(
-            f,
-            "  errors of normals in degrees, averaged over the turns ± standard error: mean, median; expected: the \
-             predicted error; albedo: squared error over energy; 10, 20, 30: how many pixels expected within so many degrees are"
-        )?;
-        writeln!(
-            f,
-            "{:24}  {:>12}  {:>12}  {:>8}  {:>6}  {:>5} {:>5} {:>5}",
-            "method", "mean", "median", "expected", "albedo", "10", "20", "30"
-        )?;
-        for line in &self.lines {
-            let (mean, error) = line.mean_of(|turn| turn.mean_deg);
-            let (median, median_error) = line.mean_of(|turn| turn.median_deg);
-            let (expected, _) = line.mean_of(|turn| turn.expected_mean_deg);
-            let (albedo, _) = line.mean_of(|turn| turn.albedo);
-            write!(
-                f,
-                "{:24}  {:>12}  {:>12}  {expected:>8.1}  {albedo:>6.3} ",
-                line.method,
-                format!("{mean:.1} ± {error:.1}"),
-                format!("{median:.1} ± {median_error:.1}"),
-            )?;
-            for limit in 0..LIMITS_DEG.len() {
-                let kept = line.kept(limit);
-                let kept = kept.map_or("-".to_owned(), |kept| format!("{:.0} %", 100.0 * kept));
-                write!(f, " {kept:>5}")?;
-            }
-            writeln!(f)?;
-        }
-        Ok(())
-    }
+fn albedo_error(
+    truth: &Rgb<Linear>,
+    found: &Rgb<Linear>,
+    inside: &[bool],
+) -> Result<f64, MetricError> {
+    let (extent, right) = (truth.planes().extent(), truth.planes().planes());
+    let nothing = Planes::<3>::zeros(extent);
+    let error = Comparison::new(extent, &right, &found.planes().planes(), inside)?;
+    let energy = Comparison::new(extent, &right, &nothing.planes(), inside)?;
+    Ok(error.mse(ScaleFit::Channel) / energy.mse(ScaleFit::None).max(1e-12))
 }

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::error::Error;
-use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -19,7 +18,6 @@ use relight_synth::Library;
 use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
-use serde::Serialize;
 use serde_json::json;
 
 use crate::commands::CommandResult;
@@ -205,7 +203,7 @@ impl TableArguments {
     }
 
     /// Prints the table, and writes it where that is asked for.
-    fn report(&self, table: &(impl Serialize + Display), console: Console) -> CommandResult {
+    fn report(&self, table: &ScoreTable, console: Console) -> CommandResult {
         if let Some(path) = &self.output {
             let mut bytes = serde_json::to_vec_pretty(table)?;
             bytes.push(b'\n');

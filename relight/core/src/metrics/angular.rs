@@ -69,7 +69,7 @@ fn summary(sorted: &[f64]) -> AngularError {
 
 /// The angle between two vectors, radians, 0..=pi. By the arc tangent, which keeps small angles
 /// exact where the arc cosine does not.
-fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     let cross = [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

@@ -34,7 +34,7 @@ mod intrinsic;
 mod scaled;
 mod structural;
 
-pub use angular::{AngularError, angular_error};
+pub use angular::{AngularError, angle, angular_error};
 pub use comparison::Comparison;
 pub use error::MetricError;
 pub use intrinsic::{Convention, IntrinsicError, intrinsic_error};
