@@ -100,6 +100,15 @@ impl ShLight {
         }
     }
 
+    /// Adds a part of another light.
+    pub fn add(&mut self, other: &Self, part: [f64; 3]) {
+        for (to, from) in self.coefficients.iter_mut().zip(&other.coefficients) {
+            for ((to, from), part) in to.iter_mut().zip(from).zip(part) {
+                *to += part * from;
+            }
+        }
+    }
+
     /// The light in other colours: each coefficient times `tint`.
     #[must_use]
     pub fn tinted(mut self, tint: [f64; 3]) -> Self {

@@ -75,10 +75,10 @@ impl Lighting {
             .map(|e| f64::from(e) / std::f64::consts::PI);
         let mut sum = ShLight::even(order, even);
         for lamp in &self.lamps {
-            add(&mut sum, &lamp.coefficients(order));
+            sum.add(&lamp.coefficients(order), [1.0; 3]);
         }
         if let Some(environment) = &self.environment {
-            add(&mut sum, &environment.coefficients(order, panoramas));
+            sum.add(&environment.coefficients(order, panoramas), [1.0; 3]);
         }
         sum
     }
@@ -98,14 +98,5 @@ impl Lighting {
             lamp.emitter = lamp.emitter.above(vertical);
         }
         self
-    }
-}
-
-fn add(sum: &mut ShLight, more: &ShLight) {
-    let pairs = sum.coefficients_mut().iter_mut().zip(more.coefficients());
-    for (sum, more) in pairs {
-        for (sum, more) in sum.iter_mut().zip(more) {
-            *sum += more;
-        }
     }
 }

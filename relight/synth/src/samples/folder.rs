@@ -147,11 +147,8 @@ impl SampleFolder {
             for &number in of_view {
                 let files = recipe.sample(library, &view, number).files()?;
                 self.write(&name_of(number), |folder| {
-                    for (name, bytes) in &files {
-                        let path = folder.join(name);
-                        fs::write(&path, bytes).map_err(SynthError::write(&path))?;
-                    }
-                    Ok::<_, SynthError>(())
+                    let mut files = files.iter();
+                    files.try_for_each(|(name, bytes)| write_file(folder, name, bytes))
                 })?;
                 written.new += 1;
                 progress();
@@ -174,20 +171,38 @@ impl SampleFolder {
         sample: &str,
         write: impl FnOnce(&Path) -> Result<(), E>,
     ) -> Result<(), E> {
-        let partial = self
-            .path
-            .join(format!(".{sample}.{}.partial", process::id()));
-        let written = || {
-            fs::create_dir(&partial).map_err(SynthError::write(&partial))?;
-            write(&partial)?;
-            let place = self.path.join(sample);
-            Ok(fs::rename(&partial, &place).map_err(SynthError::write(&place))?)
-        };
-        written().inspect_err(|_| {
-            // The first error is the one that counts.
-            let _ = fs::remove_dir_all(&partial);
-        })
+        write_folder(&self.path.join(sample), write)
     }
+}
+
+/// Writes a folder that appears when all its files are in it, in place of an older one. `write` is given it meanwhile.
+pub(crate) fn write_folder<R, E: From<SynthError>>(
+    place: &Path,
+    write: impl FnOnce(&Path) -> Result<R, E>,
+) -> Result<R, E> {
+    let name = place.file_name().unwrap_or_default().to_string_lossy();
+    let partial = place.with_file_name(format!(".{name}.{}.partial", process::id()));
+    // What a killed process of this number left.
+    let _ = fs::remove_dir_all(&partial);
+    let written = || {
+        fs::create_dir_all(&partial).map_err(SynthError::write(&partial))?;
+        let result = write(&partial)?;
+        if place.is_dir() {
+            fs::remove_dir_all(place).map_err(SynthError::write(place))?;
+        }
+        fs::rename(&partial, place).map_err(SynthError::write(place))?;
+        Ok(result)
+    };
+    written().inspect_err(|_| {
+        // The first error is the one that counts.
+        let _ = fs::remove_dir_all(&partial);
+    })
+}
+
+/// Writes a file into such a folder.
+pub(crate) fn write_file(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), SynthError> {
+    let path = folder.join(name);
+    fs::write(&path, bytes).map_err(SynthError::write(&path))
 }
 
 fn name_of(number: u64) -> String {

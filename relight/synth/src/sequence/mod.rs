@@ -29,9 +29,9 @@ use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 use super::SynthError;
 use super::library::Library;
-use super::samples::folder::{SynthSummary, holds_samples};
+use super::samples::folder::{SynthSummary, holds_samples, write_file, write_folder};
 use super::samples::sample::mask;
-use ground_truth::GroundTruthFolder;
+use ground_truth::{ground_truth_of, write_frame, write_object};
 use simulated::{RenderedFrame, SimulatedSequence};
 pub(crate) use table_pose::{TablePose, standing_object};
 
@@ -118,7 +118,7 @@ fn is_whole(
     if entry.input != turn.input() {
         return Err(SynthError::other_settings(out));
     }
-    let truth = ground_truth::ground_truth_of(out, &turn.session);
+    let truth = ground_truth_of(out, &turn.session);
     // The last file that came to be part of it.
     Ok(truth.join("light.txt").is_file() && dataset.check_integrity(out, &turn.session).is_ok())
 }
@@ -134,30 +134,31 @@ fn write_turn(
     let frames = turn.description.frames;
     let layout = Layout::Webdataset;
     let mut writer = ShardWriter::create(folder.path(), layout, &turn.session, frames, &mask)?;
-    let truth = GroundTruthFolder::create(folder.path(), &turn.session)?;
-    truth.write_object(turn)?;
     let mut records = Vec::new();
-    let mut lines = Vec::new();
-    for first in (0..frames).step_by(BATCH as usize) {
-        let batch: Result<Vec<RenderedFrame>, SynthError> = (first..frames.min(first + BATCH))
-            .into_par_iter()
-            .map(|index| {
-                let frame = turn.frame(index, &spans);
-                progress();
-                frame
-            })
-            .collect();
-        for frame in batch? {
-            truth.write_frame(&frame)?;
-            lines.extend(serde_json::to_vec(&frame.truth).unwrap_or_default());
-            lines.push(b'\n');
-            records.push(frame.sample.record.clone());
-            writer.push(frame.sample)?;
+    let place = ground_truth_of(folder.path(), &turn.session);
+    let files = write_folder(&place, |truth| {
+        write_object(truth, turn)?;
+        let mut lines = Vec::new();
+        for first in (0..frames).step_by(BATCH as usize) {
+            let batch: Result<Vec<RenderedFrame>, SynthError> = (first..frames.min(first + BATCH))
+                .into_par_iter()
+                .map(|index| {
+                    let frame = turn.frame(index, &spans);
+                    progress();
+                    frame
+                })
+                .collect();
+            for frame in batch? {
+                write_frame(truth, &frame)?;
+                lines.extend(serde_json::to_vec(&frame.truth).unwrap_or_default());
+                lines.push(b'\n');
+                records.push(frame.sample.record.clone());
+                writer.push(frame.sample)?;
+            }
         }
-    }
-    truth.write("frames.jsonl", &lines)?;
-    let files = writer.finish()?;
-    truth.publish()?;
+        write_file(truth, "frames.jsonl", &lines)?;
+        Ok::<_, SynthError>(writer.finish()?)
+    })?;
     let spec_net = records.iter().filter(|record| record.spec_net).count();
     let entry = SessionEntry {
         id: turn.session.clone(),

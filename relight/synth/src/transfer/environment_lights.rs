@@ -67,7 +67,7 @@ impl EnvironmentLights {
         if random.chance(MIXED) {
             let other = self.panorama(&mut random);
             let share = random.uniform(0.1..0.5);
-            add(&mut light, &other, [share; 3]);
+            light.add(&other, [f64::from(share); 3]);
         }
         if random.chance(WITH_LAMPS) {
             for _ in 0..random.count(1..4) {
@@ -77,7 +77,7 @@ impl EnvironmentLights {
         if random.chance(WITH_EVEN) {
             let share = f64::from(random.log_uniform(0.1..1.5)) as f32;
             let even = ShLight::even(TRANSFER_ORDER, [1.0; 3]);
-            add(&mut light, &even, [share; 3]);
+            light.add(&even, [f64::from(share); 3]);
         }
         if random.chance(TWO_SIDED) {
             let left = random.uniform(0.02..0.4);
@@ -149,18 +149,6 @@ fn of_mean_one(light: &ShLight) -> Option<ShLight> {
     let even = ShLight::even(light.order(), [1.0; 3]);
     let mean = light.coefficients()[0].iter().sum::<f64>() / 3.0 / even.coefficients()[0][0];
     (mean > 0.0 && mean.is_finite()).then(|| light.clone().tinted([1.0 / mean; 3]))
-}
-
-fn add(light: &mut ShLight, other: &ShLight, share: [f32; 3]) {
-    let pairs = light
-        .coefficients_mut()
-        .iter_mut()
-        .zip(other.coefficients());
-    for (to, from) in pairs {
-        for c in 0..3 {
-            to[c] += f64::from(share[c]) * from[c];
-        }
-    }
 }
 
 /// A lamp of some size, above the horizon mostly, beside which the rest may be faint.
