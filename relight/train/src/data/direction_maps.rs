@@ -7,7 +7,7 @@ use relight_core::light::{Direction, Order, basis};
 use relight_core::render::cosine_lobe;
 use tch::{Device, Kind, Tensor};
 
-use super::tensors::upload;
+use crate::engine::tensors::upload;
 
 /// Rows of a map of directions, from +y to -y; columns go once around, the first and the last are the same.
 const ROWS: usize = 25;

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `photographs`, `turns` | batches of a run |
 //! | `view_pool`, `view_loader`, `view_ring` | processor cores cast views once; which of them a step draws from, on the device |
-//! | `direction_maps`, `tensors`, `noise` | what lighting them is made of |
+//! | `direction_maps`, `noise` | what lighting them is made of |
 //! | `symmetry`, `sample` | photographs as the networks see them |
 //! | `turn_reader` | frames of shards |
 
@@ -13,7 +13,6 @@ mod noise;
 pub(crate) mod photographs;
 pub(crate) mod sample;
 pub(crate) mod symmetry;
-mod tensors;
 pub(crate) mod turn_reader;
 pub(crate) mod turns;
 mod view_loader;

@@ -2,7 +2,7 @@
 
 use tch::{Device, Kind, Tensor};
 
-use super::tensors::indices;
+use crate::engine::tensors::indices;
 use relight_synth::stream;
 
 /// Tiles of noise: each sample has one of them.

@@ -2,7 +2,7 @@
 
 use tch::{Device, Kind, Tensor};
 
-use super::tensors::indices;
+use crate::engine::tensors::indices;
 use relight_core::reader::Rank;
 use relight_synth::stream;
 

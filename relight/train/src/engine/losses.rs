@@ -5,6 +5,8 @@
 
 use tch::Tensor;
 
+use super::tensors::over_channels;
+
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
 /// A chord so short counts as its square, for a gradient where it is 0.
@@ -17,6 +19,14 @@ pub(crate) struct Mean {
     pub value: Tensor,
     /// Its weight, one number without gradient; above 0 if there is a mean.
     pub over: Tensor,
+}
+
+impl Mean {
+    /// A sum over so much.
+    pub(crate) fn new(sum: Tensor, over: Tensor) -> Self {
+        let value = sum / &over;
+        Self { value, over }
+    }
 }
 
 /// Error that a factor of each picture cannot mend, as a part of the ground truth's energy: 0 for a multiple
@@ -71,33 +81,26 @@ pub(crate) fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> [Mean
         let channels = error.size()[1] as f64;
         let sum = (error.abs() * &both).sum(None);
         let over = both.sum(None) * channels + TINY;
-        let value = &sum / &over;
-        Mean { value, over }
+        Mean::new(sum, over)
     };
     [along(2), along(3)]
 }
 
 /// `1 - cos` of the angle between unit normals, mean under the weight.
 pub(crate) fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Mean {
-    let cosine = (found * truth).sum_dim_intlist([1_i64].as_slice(), true, None);
+    let cosine = over_channels(&(found * truth));
     let error = (-&cosine + 1.0) * weight;
     let over = weight.sum(None) + TINY;
-    let value = error.sum(None) / &over;
-    Mean { value, over }
+    Mean::new(error.sum(None), over)
 }
 
 /// Length of the chord between unit normals, `2 sin(angle / 2)`, mean under the weight. It grows as the angle does and not
 /// as its square: where two surfaces are possible, the likelier one costs least, and not the flat mean of both.
 pub(crate) fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Mean {
-    let length = ((found - truth)
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        + (CHORD_FLOOR * CHORD_FLOOR))
-        .sqrt()
+    let length = (over_channels(&(found - truth).square()) + (CHORD_FLOOR * CHORD_FLOOR)).sqrt()
         - CHORD_FLOOR;
     let over = weight.sum(None) + TINY;
-    let value = (&length * weight).sum(None) / &over;
-    Mean { value, over }
+    Mean::new((&length * weight).sum(None), over)
 }
 
 /// Distance of vectors (`batch x numbers`) from the true ones in parts of their length, mean over the batch without those of
@@ -110,15 +113,12 @@ pub(crate) fn relative_distance(found: &Tensor, truth: &Tensor) -> Mean {
     let part = length(&(found - truth)) / &of_truth * &known;
     // Of few numbers: anything added to them would show where a batch is divided.
     let over = known.sum(None).clamp_min(TINY);
-    let value = part.sum(None) / &over;
-    Mean { value, over }
+    Mean::new(part.sum(None), over)
 }
 
 /// Mean angle between unit normals under the weight, degrees.
 pub(crate) fn angular_degrees(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Tensor {
-    let cosine = (found * truth)
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        .clamp(-1.0, 1.0);
+    let cosine = over_channels(&(found * truth)).clamp(-1.0, 1.0);
     let angle = cosine.acos().rad2deg() * weight;
     let weights = weight.sum(None) + TINY;
     angle.sum(None) / &weights

@@ -14,5 +14,6 @@ pub(crate) mod metrics_log;
 pub(crate) mod model;
 pub(crate) mod run;
 pub(crate) mod task;
+pub(crate) mod tensors;
 pub(crate) mod terms;
 pub(crate) mod trainable;

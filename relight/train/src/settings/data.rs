@@ -21,7 +21,7 @@ pub struct DataSettings {
     pub size: u32,
     /// Views from which each step draws, at most.
     pub views: u64,
-    /// Views that exist from the first step on; all of them where there is none.
+    /// Views that exist from the first step on, by default all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_views: Option<u64>,
     /// New views cast at each step; once there are `views`, in place of the oldest.

@@ -5,6 +5,7 @@ use tch::Tensor;
 use super::shadow_vs_paint::ShadowVsPaint;
 use crate::data::sample::TruthBatch;
 use crate::engine::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
+use crate::engine::tensors::{grey, over_channels};
 use crate::engine::terms::LossTerms;
 use crate::settings::DecomposeLossCoefficients;
 use relight_photo::decompose::{HIGHLIGHT_OFFSET, LOG_LUMINANCE, LOG_SHADING, MIN_FACING};
@@ -16,9 +17,9 @@ const ALBEDO_FLOOR: f64 = 0.02;
 /// Added to shading before the picture is divided by it.
 const DIVISOR_FLOOR: f64 = 0.02;
 /// Highlights of this size count fully.
-pub(crate) const FULL_HIGHLIGHT: f64 = 0.1;
+const FULL_HIGHLIGHT: f64 = 0.1;
 /// How much more a full highlight counts than none: most pixels have none, and a prediction without any would do.
-pub(crate) const HIGHLIGHT_EMPHASIS: f64 = 8.0;
+const HIGHLIGHT_EMPHASIS: f64 = 8.0;
 /// Energy of a faint highlight, a pixel.
 const FAINT_ENERGY: f64 = 1e-4;
 
@@ -56,10 +57,7 @@ impl PredictedTensors {
         let part = |from: i64, count: i64| prediction.narrow(1, from, count);
         let facing = part(2, 1).softplus() + f64::from(MIN_FACING);
         let normals = Tensor::cat(&[part(0, 2), facing], 1);
-        let length = normals
-            .square()
-            .sum_dim_intlist([1_i64].as_slice(), true, None)
-            .sqrt();
+        let length = over_channels(&normals.square()).sqrt();
         let log_luminance = input.narrow(1, LOG_LUMINANCE as i64, 1) * 2.0 - 2.0;
         let log_shading = (part(7, 1) + part(8, 1).sigmoid() * &log_luminance)
             .clamp(f64::from(LOG_SHADING.0), f64::from(LOG_SHADING.1));
@@ -131,7 +129,7 @@ pub(crate) fn decompose_losses(
     }
     let distance = chord(&prediction.normals, &batch.normals, mask);
     terms.add_mean("normals", coefficients.normals, distance);
-    let highlight = highlight_error(batch, prediction);
+    let highlight = highlight_error(&prediction.highlight, &batch.highlight, mask);
     terms.add_mean("highlight", coefficients.highlight, highlight);
     let energy = highlight_energy_error(batch, prediction);
     terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
@@ -147,14 +145,11 @@ pub(crate) fn decompose_losses(
 }
 
 /// Mean absolute error, in which highlights count more than their absence.
-fn highlight_error(batch: &TruthBatch, prediction: &PredictedTensors) -> Mean {
-    let truth = &batch.highlight;
-    let emphasis = (truth.clamp(0.0, FULL_HIGHLIGHT) * (HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT) + 1.0)
-        * &batch.mask;
-    let error = (&prediction.highlight - truth).abs() * &emphasis;
-    let over = batch.mask.sum(None).clamp_min(1.0);
-    let value = error.sum(None) / &over;
-    Mean { value, over }
+pub(crate) fn highlight_error(found: &Tensor, truth: &Tensor, mask: &Tensor) -> Mean {
+    let emphasis =
+        (truth.clamp(0.0, FULL_HIGHLIGHT) * (HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT) + 1.0) * mask;
+    let error = (found - truth).abs() * &emphasis;
+    Mean::new(error.sum(None), mask.sum(None).clamp_min(1.0))
 }
 
 /// Energy of the error as a part of the energy of the batch's highlights: 1 for a prediction without any. A batch
@@ -164,10 +159,5 @@ fn highlight_energy_error(batch: &TruthBatch, prediction: &PredictedTensors) -> 
     let faint = batch.mask.sum(None) * FAINT_ENERGY;
     let over = energy(&batch.highlight) + &faint;
     let error = energy(&(&prediction.highlight - &batch.highlight));
-    let value = &error / &over;
-    Mean { value, over }
-}
-
-fn grey(of: &Tensor) -> Tensor {
-    of.mean_dim([1_i64].as_slice(), true, None)
+    Mean::new(error, over)
 }

@@ -10,6 +10,7 @@ use crate::data::sample::TruthBatch;
 use crate::distributed::process_group::ProcessGroup;
 use crate::engine::losses::{angular_degrees, relative_distance, scale_invariant, windowed};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
+use crate::engine::tensors::grey;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{DecomposeSettings, first_difference};
@@ -116,7 +117,6 @@ fn figures(
     prediction: &PredictedTensors,
 ) -> Result<Vec<(&'static str, f64)>, TrainError> {
     let mask = &batch.mask;
-    let grey = |of: &Tensor| of.mean_dim([1_i64].as_slice(), true, None);
     let diffuse = (&batch.picture - &batch.highlight).clamp_min(0.0);
     let quotient = grey(&diffuse) / prediction.shading.clamp_min(0.03);
     let albedo = grey(&batch.albedo);

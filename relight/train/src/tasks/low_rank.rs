@@ -9,6 +9,7 @@
 //! v is the first eigenvector of the N x N Gram matrix R R^T: squaring that matrix again and again
 //! leaves nothing else of it, and no decomposition of d columns is needed.
 
+use crate::engine::tensors::over_channels;
 use tch::Tensor;
 
 /// How often the Gram matrix is squared: the second eigenvalue counts as its ratio to the first, to
@@ -24,7 +25,7 @@ pub(crate) fn first_singular_vector(rows: &Tensor) -> Tensor {
     let mut power = rows.matmul(&rows.transpose(1, 2));
     for squared in 0..=SQUARINGS {
         let diagonal = power.diagonal(0, 1, 2);
-        let trace = diagonal.sum_dim_intlist([1_i64].as_slice(), true, None);
+        let trace = over_channels(&diagonal);
         let trace = trace.clamp_min(TINY).unsqueeze(2);
         power = &power / &trace;
         if squared < SQUARINGS {
@@ -38,9 +39,7 @@ pub(crate) fn first_singular_vector(rows: &Tensor) -> Tensor {
         .view([size[0], 1, 1])
         .expand([size[0], size[1], 1], false);
     let column = power.gather(2, &index, false);
-    let square = column
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None);
+    let square = over_channels(&column.square());
     &column / square.clamp_min(TINY).sqrt()
 }
 
@@ -64,7 +63,7 @@ pub(crate) fn low_rank_loss(rows: &Tensor) -> Tensor {
 /// `batch x 2 x height x width`: what Spec-Net's low-rank loss looks at, since highlights are whiter
 /// than the object.
 pub(crate) fn chromaticity(diffuse: &Tensor) -> Tensor {
-    let sum = diffuse.sum_dim_intlist([1_i64].as_slice(), true, None);
+    let sum = over_channels(diffuse);
     diffuse.narrow(1, 0, 2) / sum.clamp_min(1e-5)
 }
 

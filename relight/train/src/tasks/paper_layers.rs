@@ -3,7 +3,8 @@
 
 use tch::Tensor;
 
-use relight_core::render::{DiffuseForm, RELEASED_AMBIENT, diffuse_constants, power_constants};
+use crate::engine::tensors::{of_light, over_channels, srgb_value};
+use relight_core::render::{RELEASED_AMBIENT, diffuse_constants, power_constants};
 
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
@@ -15,21 +16,13 @@ pub(crate) fn network_input(srgb: &Tensor, mask: &Tensor) -> Tensor {
 
 /// The sRGB values of linear light, 0..=1.
 pub(crate) fn to_srgb(linear: &Tensor) -> Tensor {
-    let light = linear.clamp(0.0, 1.0);
-    let dark = &light * 12.92;
-    // The root's slope at 0 is infinite: there the line is taken, and the root must not be asked.
-    let bright = light.clamp_min(0.003).pow_tensor_scalar(1.0 / 2.4) * 1.055 - 0.055;
-    dark.where_self(&light.le(0.003_130_8), &bright)
+    srgb_value(&linear.clamp(0.0, 1.0))
 }
 
 /// Normals (p, q, 1) over their length of slopes (p, q), 0 outside the mask. y is as the slopes have it: down in the
 /// paper's figures and in the predictions of Normal-Net.
 pub(crate) fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Tensor {
-    let length = (slopes
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        + 1.0)
-        .sqrt();
+    let length = (over_channels(&slopes.square()) + 1.0).sqrt();
     let one = slopes.narrow(1, 0, 1).ones_like();
     let vectors = Tensor::cat(&[slopes.shallow_clone(), one], 1);
     &vectors / &length * mask
@@ -37,25 +30,11 @@ pub(crate) fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Tensor {
 
 /// The shading of normals (y up) under coefficients, `batch x 9 x 3` (harmonic, colour): `batch x 3 x height x width`.
 ///
-/// The released form takes |L00| and adds 0.1, as [`DiffuseForm::Released`] says.
-pub(crate) fn diffuse_shading(
-    normals: &Tensor,
-    coefficients: &Tensor,
-    form: DiffuseForm,
-) -> Tensor {
-    let coefficients = match form {
-        DiffuseForm::Irradiance => coefficients.shallow_clone(),
-        DiffuseForm::Released => {
-            let first = coefficients.narrow(1, 0, 1).abs();
-            Tensor::cat(&[first, coefficients.narrow(1, 1, 8)], 1)
-        }
-    };
-    let sums = weighted_terms(&diffuse_terms(normals), &coefficients);
-    let positive = sums.clamp_min(0.0);
-    match form {
-        DiffuseForm::Irradiance => positive,
-        DiffuseForm::Released => &positive + RELEASED_AMBIENT,
-    }
+/// The released form takes |L00| and adds 0.1, as [`relight_core::render::DiffuseForm::Released`] says.
+pub(crate) fn diffuse_shading(normals: &Tensor, coefficients: &Tensor) -> Tensor {
+    let first = coefficients.narrow(1, 0, 1).abs();
+    let coefficients = Tensor::cat(&[first, coefficients.narrow(1, 1, 8)], 1);
+    of_light(&coefficients, &diffuse_terms(normals)).clamp_min(0.0) + RELEASED_AMBIENT
 }
 
 /// The paper's highlight (5) of normals (y up): s_p times the sum of C_lm (Â_l Ŷ_lm(n))^α, each power with the sign of what
@@ -69,16 +48,7 @@ pub(crate) fn power_highlight(
     let terms = power_terms(normals);
     let exponent = smoothness.view([-1, 1, 1, 1]);
     let powers = terms.abs().clamp_min(TINY).pow(&exponent) * terms.sign();
-    let sums = weighted_terms(&powers, coefficients);
-    &sums * reflectance.view([-1, 3, 1, 1])
-}
-
-/// `batch x 9 x h x w` terms times `batch x 9 x 3` coefficients: `batch x 3 x h x w`.
-fn weighted_terms(terms: &Tensor, coefficients: &Tensor) -> Tensor {
-    let size = terms.size();
-    let flat = terms.view([size[0], 9, size[2] * size[3]]);
-    let sums = coefficients.transpose(1, 2).matmul(&flat);
-    sums.view([size[0], 3, size[2], size[3]])
+    of_light(coefficients, &powers) * reflectance.view([-1, 3, 1, 1])
 }
 
 /// x, y and z of normals.
@@ -141,11 +111,7 @@ fn power_terms(normals: &Tensor) -> Tensor {
 /// light's colour.
 pub(crate) fn predicted_light(output: &Tensor) -> Tensor {
     let nine = output.narrow(1, 0, 9);
-    let length = nine
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        .clamp_min(TINY)
-        .sqrt();
+    let length = over_channels(&nine.square()).clamp_min(TINY).sqrt();
     let nine = (&nine / &length).unsqueeze(2);
     nine.matmul(&output.narrow(1, 9, 3).unsqueeze(1))
 }
@@ -162,7 +128,7 @@ mod tests {
     use super::*;
     use relight_core::image::Extent;
     use relight_core::light::{Normals, ShLight};
-    use relight_core::render::{DiffuseLayer, Gloss, PowerLayer};
+    use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, PowerLayer};
     use tch::{Device, Kind};
 
     const SIDE: usize = 21;
@@ -204,12 +170,10 @@ mod tests {
     fn shading_is_that_of_the_plain_layer() {
         let (tensor, mask, normals) = sphere();
         let light = some_light();
-        for form in [DiffuseForm::Irradiance, DiffuseForm::Released] {
-            let plain = DiffuseLayer::new(&light, form).shading(&normals);
-            let ours = diffuse_shading(&tensor, &coefficients(&light), form) * &mask;
-            let error = largest_difference(&ours, plain.planes().planes());
-            assert!(error < 1e-5, "{form:?}: {error}");
-        }
+        let plain = DiffuseLayer::new(&light, DiffuseForm::Released).shading(&normals);
+        let ours = diffuse_shading(&tensor, &coefficients(&light)) * &mask;
+        let error = largest_difference(&ours, plain.planes().planes());
+        assert!(error < 1e-5, "{error}");
     }
 
     #[test]
@@ -221,7 +185,7 @@ mod tests {
         let reflectance = Tensor::from_slice(&[0.5_f32, 0.25, 1.0]).view([1, 3]);
         let smoothness = Tensor::from_slice(&[6.0_f32]);
         let ours = power_highlight(&tensor, &coefficients(&light), &reflectance, &smoothness);
-        let ours = ours.unwrap() * &mask;
+        let ours = ours * &mask;
         let error = largest_difference(&ours, plain.planes().planes());
         let largest = plain
             .planes()

@@ -13,6 +13,7 @@ use super::paper_phases::{
 };
 use super::validation::{highlight_figures, rank_residual};
 use crate::data::sample::TruthBatch;
+use crate::engine::tensors::grey;
 use crate::data::turn_reader::TurnTensors;
 use crate::engine::losses::{Mean, angular_degrees};
 use crate::engine::model::Model;
@@ -143,7 +144,7 @@ impl PhaseNetworks {
         Ok(match self {
             Self::Spec => {
                 let highlight = highlight_of(own, picture, mask)?;
-                let grey = highlight.mean_dim([1_i64].as_slice(), true, None);
+                let grey = grey(&highlight);
                 highlight_figures(&grey, batch)?.to_vec()
             }
             Self::Normal | Self::Joint { .. } => {

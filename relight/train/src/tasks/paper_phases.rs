@@ -13,7 +13,7 @@
 
 use tch::Tensor;
 
-use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS};
+use super::decompose::highlight_error;
 use super::low_rank::{chromaticity, low_rank_loss};
 use super::paper_layers::{
     diffuse_shading, network_input, normals_of_slopes, power_highlight, predicted_gloss,
@@ -23,8 +23,8 @@ use crate::data::sample::TruthBatch;
 use crate::data::turn_reader::TurnTensors;
 use crate::engine::losses::{Mean, angular, scale_invariant};
 use crate::engine::model::Model;
+use crate::engine::tensors::{grey, over_channels};
 use crate::error::TrainError;
-use relight_core::render::DiffuseForm;
 
 /// Least diffuse light, so that its chromaticity exists.
 const DARKEST: f64 = 1e-5;
@@ -87,9 +87,7 @@ fn rows(of: &Tensor, mask: &Tensor) -> Tensor {
 /// The same, each row brought to the length 1.
 pub(crate) fn equal_rows(of: &Tensor, mask: &Tensor) -> Tensor {
     let rows = (of * mask).flatten(1, -1);
-    let square = rows
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None);
+    let square = over_channels(&rows.square());
     (&rows / square.clamp_min(TINY).sqrt()).unsqueeze(0)
 }
 
@@ -149,11 +147,8 @@ pub(crate) fn spec_on_turns(
 pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
     let truth = batch.highlight.clamp(0.0, 1.0);
-    let emphasis = (truth.clamp(0.0, FULL_HIGHLIGHT) * (HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT) + 1.0)
-        * &batch.mask;
-    let error = (&found - &truth).abs() * &emphasis;
-    let over = batch.mask.sum(None).clamp_min(1.0);
-    let value = error.sum(None) / &over * (1.0 / 3.0);
+    let Mean { value, over } = highlight_error(&found, &truth, &batch.mask);
+    let value = value * (1.0 / 3.0);
     Ok(Mean { value, over })
 }
 
@@ -172,8 +167,8 @@ pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean
 /// [`TrainError::Torch`].
 pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let coefficients = light_of(light, &diffuse_of_truth(batch), &batch.mask)?;
-    let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released);
-    let grey = shading.mean_dim([1_i64].as_slice(), true, None);
+    let shading = diffuse_shading(&batch.normals, &coefficients);
+    let grey = grey(&shading);
     let value = scale_invariant(&grey, &batch.shading, &batch.mask);
     let over = Tensor::from_slice(&[batch.mask.size()[0]]);
     Ok(Mean { value, over })
@@ -210,7 +205,7 @@ pub(crate) fn reflectance(
     };
     let normals = normals_of(normal, &diffuse, mask)?;
     let coefficients = light_of(light, &diffuse, mask)?;
-    let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released);
+    let shading = diffuse_shading(&normals, &coefficients);
     Ok((&diffuse / shading.clamp_min(MIN_SHADING)).clamp(0.0, 1.0))
 }
 
@@ -353,7 +348,7 @@ mod tests {
             })
             .collect();
         let light = Tensor::from_slice(&light).view([frames, 9, 3]);
-        let shading = diffuse_shading(&normals, &light, DiffuseForm::Released);
+        let shading = diffuse_shading(&normals, &light);
         let albedo = (x * 7.0)
             .sin()
             .f_mul_scalar(0.25)

@@ -6,6 +6,7 @@
 use tch::Tensor;
 
 use crate::engine::losses::Mean;
+use crate::engine::tensors::grey;
 
 /// Keeps logarithms of dark values finite.
 const FLOOR: f64 = 0.02;
@@ -26,7 +27,7 @@ pub(crate) struct ShadowVsPaint {
 impl ShadowVsPaint {
     /// That of albedo under a shading.
     pub(crate) fn new(albedo: &Tensor, shading: &Tensor, mask: &Tensor) -> Self {
-        let grey = albedo.mean_dim([1_i64].as_slice(), true, None);
+        let grey = grey(albedo);
         let (paint, shadow) = (darkness(&grey, mask), darkness(shading, mask));
         let sum = &paint + &shadow;
         Self {
@@ -40,8 +41,7 @@ impl ShadowVsPaint {
         // softplus(x) - p x is the cross entropy of the probability p and the logit x.
         let entropy = logit.softplus() - &self.paint * logit;
         let over = self.weight.sum(None).clamp_min(1.0);
-        let value = (&entropy * &self.weight).sum(None) / &over;
-        Mean { value, over }
+        Mean::new((&entropy * &self.weight).sum(None), over)
     }
 }
 

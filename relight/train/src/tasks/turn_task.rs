@@ -6,6 +6,7 @@ use crate::data::turns::{TurnBatch, Turns};
 use crate::distributed::process_group::ProcessGroup;
 use crate::engine::losses::{Mean, angular_degrees, chord};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
+use crate::engine::tensors::over_channels;
 use crate::engine::terms::LossTerms;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
@@ -77,11 +78,7 @@ impl TurnNetworkTask {
 /// Unit normals, and the logarithm of their expected chord error.
 fn predicted_normals(output: &Tensor) -> (Tensor, Tensor) {
     let normals = output.narrow(1, 0, 3);
-    let length = (normals
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        + 1e-8)
-        .sqrt();
+    let length = (over_channels(&normals.square()) + 1e-8).sqrt();
     let log_chord = output.narrow(1, 3, 1).clamp(LOG_CHORD.0, LOG_CHORD.1);
     (&normals / &length, log_chord)
 }
@@ -109,14 +106,10 @@ fn albedo_error(errors: &Tensor, batch: &TurnBatch) -> Mean {
 /// Minus the logarithm of the chord's likelihood, where it is distributed exponentially with the expected mean.
 fn expected_error(normals: &Tensor, log_chord: &Tensor, batch: &TurnBatch) -> Mean {
     let found = normals.detach();
-    let chord = (&found - &batch.normals)
-        .square()
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        .sqrt();
+    let chord = over_channels(&(&found - &batch.normals).square()).sqrt();
     let each = &chord * (-log_chord).exp() + log_chord;
     let over = batch.mask.sum(None).clamp_min(1.0);
-    let value = (&each * &batch.mask).sum(None) / &over;
-    Mean { value, over }
+    Mean::new((&each * &batch.mask).sum(None), over)
 }
 
 impl TrainingTask for TurnNetworkTask {
@@ -207,9 +200,7 @@ impl ValidationSummary {
             let error = angular_degrees(&part(normals), &part(&batch.normals), &mask);
             self.means.push(f64::try_from(error)?);
             let inside = mask.gt(0.5);
-            let dots = (part(normals) * part(&batch.normals))
-                .sum_dim_intlist([1_i64].as_slice(), true, None)
-                .clamp(-1.0, 1.0);
+            let dots = over_channels(&(part(normals) * part(&batch.normals))).clamp(-1.0, 1.0);
             let errors = dots.acos().rad2deg().masked_select(&inside);
             let chords = (part(log_chord).exp() * 0.5).clamp_max(1.0);
             let expected = (chords.asin().rad2deg() * 2.0).masked_select(&inside);

@@ -4,7 +4,7 @@ use tch::{Kind, Tensor};
 
 use super::lit::PlannedPhoto;
 use crate::data::noise::NoiseTiles;
-use crate::data::tensors::{columns, indices, upload};
+use crate::engine::tensors::{columns, indices, over_channels, srgb_light, srgb_value, upload};
 use relight_synth::PhotoCamera;
 
 /// Part of the pixels that are darker than what a picture is exposed by.
@@ -13,12 +13,6 @@ const EXPOSED: f64 = 0.99;
 const STEP: i64 = 2;
 /// Pixels to each side of a blur's middle.
 const REACH: i64 = 2;
-/// sRGB (IEC 61966-2-1): where the power begins, in light and in values, and its numbers.
-const LINEAR_LIGHT: f64 = 0.003_130_8;
-const LINEAR_VALUE: f64 = 0.040_45;
-const LINEAR_SLOPE: f64 = 12.92;
-const OFFSET: f64 = 0.055;
-const POWER: f64 = 2.4;
 
 /// From light to camera values.
 #[derive(Debug)]
@@ -135,7 +129,7 @@ pub(super) fn percentile(image: &Tensor, mask: &Tensor) -> Tensor {
     // What is outside comes first.
     let values = (brightest.flatten(1, -1) + 1.0) * &inside - 1.0;
     let (sorted, _) = values.sort(1, false);
-    let count = inside.sum_dim_intlist([1_i64].as_slice(), true, None);
+    let count = over_channels(&inside);
     let last = sorted.size()[1] - 1;
     let above = (&count * (1.0 - EXPOSED)).floor();
     let place = (-&above + last as f64).to_kind(Kind::Int64);
@@ -181,36 +175,9 @@ fn noisy(light: &Tensor, noise: &Tensor, cameras: &[&PhotoCamera]) -> Tensor {
     light + noise * &deviation
 }
 
-fn srgb_value(light: &Tensor) -> Tensor {
-    let power =
-        light.clamp_min(LINEAR_LIGHT).pow_tensor_scalar(1.0 / POWER) * (1.0 + OFFSET) - OFFSET;
-    let line = light * LINEAR_SLOPE;
-    line.where_self(&light.le(LINEAR_LIGHT), &power)
-}
-
-fn srgb_light(value: &Tensor) -> Tensor {
-    let power = ((value.clamp_min(LINEAR_VALUE) + OFFSET) * (1.0 / (1.0 + OFFSET)))
-        .pow_tensor_scalar(POWER);
-    let line = value * (1.0 / LINEAR_SLOPE);
-    line.where_self(&value.le(LINEAR_VALUE), &power)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use relight_core::image::{ColourSpace, Srgb};
-
-    #[test]
-    fn the_response_is_that_of_srgb_both_ways() {
-        let light: Vec<f32> = (0..=200).map(|k| k as f32 / 200.0).collect();
-        let values = srgb_value(&Tensor::from_slice(&light));
-        let back = Vec::<f32>::try_from(srgb_light(&values)).unwrap();
-        let values = Vec::<f32>::try_from(values).unwrap();
-        for ((light, value), back) in light.into_iter().zip(values).zip(back) {
-            assert!((value - Srgb::from_linear(light)).abs() < 1e-5, "{light}");
-            assert!((light - back).abs() < 1e-5, "{light}");
-        }
-    }
 
     #[test]
     fn a_percentile_counts_the_object_only() {

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use tch::Tensor;
 
-use crate::data::tensors::{columns, upload};
+use crate::engine::tensors::{columns, upload};
 use relight_synth::PhotoCamera;
 
 const SIDE: i64 = 8;

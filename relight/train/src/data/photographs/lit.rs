@@ -13,8 +13,8 @@ use tch::Tensor;
 
 use super::VISIBILITY;
 use crate::data::direction_maps::DirectionMaps;
-use crate::data::tensors::{columns, dot, indices, of_light, unit, upload};
 use crate::data::view_pool::{FINISHES, Planned, ViewPool};
+use crate::engine::tensors::{columns, dot, indices, of_light, over_channels, unit, upload};
 
 /// Albedo is kept in this range.
 const ALBEDO: (f64, f64) = (0.01, 0.95);
@@ -249,10 +249,7 @@ fn printed(
     let points = own_points.index_select(0, &whose);
     let side = points.size()[2];
     let phases = waves.narrow(2, 0, 3).bmm(&points.reshape([count, 3, -1])) + waves.narrow(2, 3, 1);
-    let sum = phases
-        .sin()
-        .sum_dim_intlist([1_i64].as_slice(), true, None)
-        .reshape([count, 1, side, side]);
+    let sum = over_channels(&phases.sin()).reshape([count, 1, side, side]);
     let levels: Vec<f32> = prints.iter().map(|(.., print)| print.level).collect();
     let share = ((&sum - columns(&levels, prints.len(), own_points)) * PRINT_EDGE).sigmoid();
     let ground = albedo.index_select(0, &whose);

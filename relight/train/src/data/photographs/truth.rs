@@ -9,7 +9,7 @@ use super::camera::{SimulatedPhotos, percentile};
 use super::lit::{LitBatch, PlannedPhoto};
 use crate::data::sample::TruthBatch;
 use crate::data::symmetry::Symmetry;
-use crate::data::tensors::upload;
+use crate::engine::tensors::{grey, over_channels, upload};
 
 /// The power of the encoded colour.
 const ENCODED: f64 = 1.0 / 2.2;
@@ -25,7 +25,7 @@ pub(super) fn truth(
     let over = |of: &Tensor, dims: &[i64]| of.sum_dim_intlist(dims, true, None);
     let covered = over(mask, &[2, 3]).clamp_min(1.0);
     let shading = &lit.shading * &photographed.gain;
-    let grey = shading.mean_dim([1_i64].as_slice(), true, None);
+    let grey = grey(&shading);
     let mean = (over(&grey, &[2, 3]) / &covered).clamp_min(1e-6);
     let white = percentile(&photographed.picture, mask);
     let picture = &photographed.picture / &white;
@@ -57,7 +57,7 @@ pub(super) fn truth(
 pub(crate) fn encoded(picture: &Tensor, mask: &Tensor) -> Tensor {
     let light = picture.clamp(0.0, f64::from(MAX_LIGHT));
     let colour = light.pow_tensor_scalar(ENCODED) * 2.0 - 1.0;
-    let sum = light.sum_dim_intlist([1_i64].as_slice(), true, None);
+    let sum = over_channels(&light);
     let mean = &sum * (1.0 / 3.0);
     let log = ((&mean + f64::from(LOG_FLOOR)).log() + 2.0) * 0.5;
     let chroma = (light.narrow(1, 0, 2) - &mean) * 4.0 / (&sum + 0.03);

@@ -6,7 +6,7 @@ use relight_synth::CURVE_TERMS;
 use tch::Tensor;
 
 use super::lit::{LitTurns, PlannedTurn, mean_over};
-use crate::data::tensors::{columns, indices, upload};
+use crate::engine::tensors::{columns, grey, indices, over_channels, upload};
 
 /// Values of a curve at which clipping is looked at.
 const ANGLES: usize = 36;
@@ -95,7 +95,7 @@ fn white_level(curves: &Tensor, mask: &Tensor, parts: &[f32]) -> Tensor {
     let values = (brightest.flatten(1, -1) + 1.0) * &inside;
     let (sorted, _) = values.sort(1, false);
     let pixels = sorted.size()[1];
-    let count = inside.sum_dim_intlist([1_i64].as_slice(), true, None);
+    let count = over_channels(&inside);
     let parts = columns(parts, parts.len(), curves).reshape([-1, 1]);
     let above = (&count * (-&parts + 1.0)).ceil();
     let place = (-&above + pixels as f64)
@@ -127,7 +127,7 @@ fn mistimed(curves: &Tensor, turns: &[PlannedTurn]) -> Tensor {
 
 /// Noise of the camera, of its compression, and of light that flickers.
 fn noisy(curves: &Tensor, mask: &Tensor, turns: &[PlannedTurn], noise: &Tensor) -> Tensor {
-    let level = curves.select(1, 0).mean_dim([1_i64].as_slice(), true, None);
+    let level = grey(&curves.select(1, 0));
     let of = |which: usize| {
         let values: Vec<f32> = turns.iter().map(|one| one.plan.noise[which]).collect();
         columns(&values, turns.len(), curves)

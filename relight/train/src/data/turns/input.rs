@@ -7,7 +7,7 @@ use relight_turn::input_limits::{
 use tch::Tensor;
 
 use super::lit::{PlannedTurn, mean_over};
-use crate::data::tensors::{columns, upload};
+use crate::engine::tensors::{columns, grey, upload};
 
 /// Complex numbers as two tensors.
 struct Complex {
@@ -62,7 +62,6 @@ pub(super) fn network_input(curves: &Tensor, mask: &Tensor, turns: &[PlannedTurn
         })
         .collect();
     let (mut planes, mut whole) = (Vec::new(), Vec::new());
-    let grey = |part: &Tensor| part.mean_dim([1_i64].as_slice(), true, None);
     for (m, harmonic) in turned.iter().enumerate() {
         let shown = harmonic.each(|part| {
             if m < COLOURED {

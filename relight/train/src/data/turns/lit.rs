@@ -17,8 +17,8 @@ use relight_synth::{CURVE_TERMS, TurnMaterial, TurnPlan, TurnView};
 use tch::Tensor;
 
 use crate::data::direction_maps::DirectionMaps;
-use crate::data::tensors::{columns, dot, of_light, unit, upload};
 use crate::data::view_pool::{FINISHES, Planned, ViewPool};
+use crate::engine::tensors::{columns, dot, of_light, unit, upload};
 
 /// A colour of less than this is black. Numerical.
 const BLACK: f64 = 1e-3;
