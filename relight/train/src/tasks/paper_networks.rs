@@ -1,6 +1,5 @@
 //! The networks of the paper's phases: the one that a phase trains, the given ones, and their losses.
 
-use std::iter;
 use std::path::PathBuf;
 
 use tch::{Device, Tensor};
@@ -13,10 +12,10 @@ use super::paper_phases::{
 };
 use super::validation::{highlight_figures, rank_residual};
 use crate::data::sample::TruthBatch;
-use crate::engine::tensors::grey;
 use crate::data::turn_reader::TurnTensors;
 use crate::engine::losses::{Mean, angular_degrees};
 use crate::engine::model::Model;
+use crate::engine::tensors::grey;
 use crate::error::TrainError;
 use crate::settings::{PaperPhase, PaperSettings};
 use relight_photo::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
@@ -41,22 +40,21 @@ pub struct PaperInputs {
 
 /// A phase, with the networks that it uses and does not change.
 #[derive(Debug)]
-pub(crate) enum PhaseNetworks {
-    Spec,
-    Normal,
-    Light {
-        normal: Model,
-        spec: Option<Model>,
-    },
-    Joint {
-        light: Model,
-        spec: Option<Model>,
-    },
-    Specular {
-        spec: Model,
-        normal: Model,
-        light: Model,
-    },
+pub(crate) struct PhaseNetworks {
+    pub(super) phase: PaperPhase,
+    spec: Option<Model>,
+    normal: Option<Model>,
+    light: Option<Model>,
+}
+
+/// The options of the networks that a phase needs, and of those that it takes.
+fn options(phase: PaperPhase) -> (&'static [&'static str], &'static [&'static str]) {
+    match phase {
+        PaperPhase::Spec | PaperPhase::Normal => (&[], &[]),
+        PaperPhase::Light => (&["--normal-net"], &["--spec-net"]),
+        PaperPhase::Joint => (&["--light-net"], &["--spec-net"]),
+        PaperPhase::Specular => (&["--spec-net", "--normal-net", "--light-net"], &[]),
+    }
 }
 
 impl PhaseNetworks {
@@ -70,54 +68,39 @@ impl PhaseNetworks {
         device: Device,
         inputs: &PaperInputs,
     ) -> Result<Self, TrainError> {
-        let optional = |graph: Graph, weights: &Option<Weights>| {
-            let model = weights.as_ref().map(|weights| {
+        let (needed, taken) = options(phase);
+        let model = |option: &'static str, graph: Graph, weights: &Option<Weights>| {
+            let weights = weights.as_ref();
+            if needed.contains(&option) && weights.is_none() {
+                return Err(missing_option(phase, option));
+            }
+            let is_used = needed.contains(&option) || taken.contains(&option);
+            let model = weights.filter(|_| is_used).map(|weights| {
                 let mut model = Model::new(graph, weights, device, settings.run.precision)?;
                 model.set_trainable(false)?;
-                Ok::<_, TrainError>(model)
+                Ok(model)
             });
             model.transpose()
         };
-        let spec = || optional(spec_net(), &inputs.spec);
-        let normal = || {
-            optional(normal_net(), &inputs.normal)?
-                .ok_or_else(|| missing_option(phase, "--normal-net"))
-        };
-        let light = || {
-            let model = optional(light_net(Head::Pooled), &inputs.light)?;
-            model.ok_or_else(|| missing_option(phase, "--light-net"))
-        };
-        Ok(match phase {
-            PaperPhase::Spec => Self::Spec,
-            PaperPhase::Normal => Self::Normal,
-            PaperPhase::Light => Self::Light {
-                normal: normal()?,
-                spec: spec()?,
-            },
-            PaperPhase::Joint => Self::Joint {
-                light: light()?,
-                spec: spec()?,
-            },
-            PaperPhase::Specular => Self::Specular {
-                spec: spec()?.ok_or_else(|| missing_option(phase, "--spec-net"))?,
-                normal: normal()?,
-                light: light()?,
-            },
+        Ok(Self {
+            phase,
+            spec: model("--spec-net", spec_net(), &inputs.spec)?,
+            normal: model("--normal-net", normal_net(), &inputs.normal)?,
+            light: model("--light-net", light_net(Head::Pooled), &inputs.light)?,
         })
     }
 
     /// The networks that it uses and does not change.
-    pub(crate) fn frozen_models(&self) -> Vec<&Model> {
-        match self {
-            Self::Spec | Self::Normal => Vec::new(),
-            Self::Light { normal, spec } => iter::once(normal).chain(spec).collect(),
-            Self::Joint { light, spec } => iter::once(light).chain(spec).collect(),
-            Self::Specular {
-                spec,
-                normal,
-                light,
-            } => vec![spec, normal, light],
-        }
+    pub(crate) fn frozen_models(&self) -> impl Iterator<Item = &Model> {
+        [&self.normal, &self.light, &self.spec]
+            .into_iter()
+            .flatten()
+    }
+
+    /// Normal-Net and Light-Net; the phase trains one of them.
+    fn normal_and_light<'a>(&'a self, own: &'a Model) -> (&'a Model, &'a Model) {
+        let or_own = |model: &'a Option<Model>| model.as_ref().unwrap_or(own);
+        (or_own(&self.normal), or_own(&self.light))
     }
 
     /// The loss on a batch of synthetic samples, if the phase has one.
@@ -126,11 +109,11 @@ impl PhaseNetworks {
         own: &Model,
         batch: &TruthBatch,
     ) -> Result<Option<Mean>, TrainError> {
-        match self {
-            Self::Spec => spec_on_truth(own, batch).map(Some),
-            Self::Normal | Self::Joint { .. } => normal_on_truth(own, batch).map(Some),
-            Self::Light { .. } => light_on_truth(own, batch).map(Some),
-            Self::Specular { .. } => Ok(None),
+        match self.phase {
+            PaperPhase::Spec => spec_on_truth(own, batch).map(Some),
+            PaperPhase::Normal | PaperPhase::Joint => normal_on_truth(own, batch).map(Some),
+            PaperPhase::Light => light_on_truth(own, batch).map(Some),
+            PaperPhase::Specular => Ok(None),
         }
     }
 
@@ -141,21 +124,21 @@ impl PhaseNetworks {
         batch: &TruthBatch,
     ) -> Result<Vec<(&'static str, f64)>, TrainError> {
         let (picture, mask) = (&batch.picture, &batch.mask);
-        Ok(match self {
-            Self::Spec => {
+        Ok(match self.phase {
+            PaperPhase::Spec => {
                 let highlight = highlight_of(own, picture, mask)?;
                 let grey = grey(&highlight);
                 highlight_figures(&grey, batch)?.to_vec()
             }
-            Self::Normal | Self::Joint { .. } => {
+            PaperPhase::Normal | PaperPhase::Joint => {
                 let normals = normals_of(own, &diffuse_of_truth(batch), mask)?;
                 let degrees = angular_degrees(&normals, &batch.normals, mask);
                 vec![("normals_deg", f64::try_from(degrees)?)]
             }
-            Self::Light { .. } => {
+            PaperPhase::Light => {
                 vec![("shading", f64::try_from(light_on_truth(own, batch)?.value)?)]
             }
-            Self::Specular { .. } => Vec::new(),
+            PaperPhase::Specular => Vec::new(),
         })
     }
 
@@ -166,24 +149,24 @@ impl PhaseNetworks {
         own: &Model,
         turns: &TurnTensors,
     ) -> Result<Vec<(&'static str, f64)>, TrainError> {
-        let whole = |found| {
-            (
-                turns.picture.shallow_clone(),
-                found,
-                turns.mask.shallow_clone(),
-            )
-        };
-        let (raw, found, mask) = match self {
-            Self::Spec => {
+        let (raw, found, mask) = match self.phase {
+            PaperPhase::Spec => {
                 let Some((picture, mask)) = saturated_frames(turns) else {
                     return Ok(Vec::new());
                 };
                 let found = diffuse_chromaticity(own, &picture, &mask)?;
                 (chromaticity(&picture), found, mask)
             }
-            Self::Light { normal, spec } => whole(reflectance(normal, own, spec.as_ref(), turns)?),
-            Self::Joint { light, spec } => whole(reflectance(own, light, spec.as_ref(), turns)?),
-            Self::Normal | Self::Specular { .. } => return Ok(Vec::new()),
+            PaperPhase::Light | PaperPhase::Joint => {
+                let (normal, light) = self.normal_and_light(own);
+                let found = reflectance(normal, light, self.spec.as_ref(), turns)?;
+                (
+                    turns.picture.shallow_clone(),
+                    found,
+                    turns.mask.shallow_clone(),
+                )
+            }
+            PaperPhase::Normal | PaperPhase::Specular => return Ok(Vec::new()),
         };
         Ok(vec![
             ("pictures_residual", rank_residual(&raw, &mask)?),
@@ -197,20 +180,16 @@ impl PhaseNetworks {
         own: &Model,
         turns: &TurnTensors,
     ) -> Result<Option<Tensor>, TrainError> {
-        match self {
-            Self::Spec => spec_on_turns(own, turns),
-            Self::Normal => Ok(None),
-            Self::Light { normal, spec } => {
-                reflectance_on_turns(normal, own, spec.as_ref(), turns).map(Some)
+        let (normal, light) = self.normal_and_light(own);
+        match (self.phase, &self.spec) {
+            (PaperPhase::Spec, _) => spec_on_turns(own, turns),
+            (PaperPhase::Light | PaperPhase::Joint, spec) => {
+                reflectance_on_turns(normal, light, spec.as_ref(), turns).map(Some)
             }
-            Self::Joint { light, spec } => {
-                reflectance_on_turns(own, light, spec.as_ref(), turns).map(Some)
+            (PaperPhase::Specular, Some(spec)) => {
+                specular_on_turns(own, (spec, normal, light), turns)
             }
-            Self::Specular {
-                spec,
-                normal,
-                light,
-            } => specular_on_turns(own, (spec, normal, light), turns),
+            (PaperPhase::Normal | PaperPhase::Specular, _) => Ok(None),
         }
     }
 }

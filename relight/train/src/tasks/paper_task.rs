@@ -22,7 +22,6 @@ use relight_synth::{SkippedFile, stream};
 #[derive(Debug)]
 pub struct PaperTask {
     networks: PhaseNetworks,
-    name: &'static str,
     settings: PaperSettings,
     resources: Resources,
     trainable: Trainable,
@@ -85,7 +84,6 @@ impl PaperTask {
                 .map(validation_turns)
                 .transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
-            name: phase.name(),
             trainable: Trainable::new(graph, weights, &settings.run, resources.device)?,
             photographs,
             turns: inputs.turns.as_ref().map(open).transpose()?,
@@ -134,9 +132,9 @@ impl PaperTask {
 
     /// The coefficient of the supervised term on synthetic samples: 1 without turns.
     fn supervised(&self) -> f64 {
-        match (&self.networks, &self.turns) {
-            (PhaseNetworks::Specular { .. }, _) => 0.0,
-            (PhaseNetworks::Normal, _) | (_, None) => 1.0,
+        match (self.networks.phase, &self.turns) {
+            (PaperPhase::Specular, _) => 0.0,
+            (_, None) => 1.0,
             (_, Some(_)) => self.settings.loss.supervised,
         }
     }
@@ -144,7 +142,7 @@ impl PaperTask {
 
 impl TrainingTask for PaperTask {
     fn name(&self) -> &'static str {
-        self.name
+        self.networks.phase.name()
     }
 
     fn settings(&self) -> String {
