@@ -9,30 +9,19 @@
 //! | `settings` | [`RunSettings`] and others, in TOML |
 //!
 //! ```no_run
-//! use std::collections::BTreeMap;
 //! use std::path::Path;
 //! use std::sync::Arc;
 //!
-//! use relight_train::{DecomposeSettings, DecomposeTask, Resources, Run, TrainError, TrainObserver, read_settings};
+//! use relight_train::{DecomposeSettings, DecomposeTask, Resources, Run, TrainError, read_settings};
 //! use tch::Device;
 //!
-//! /// Ignores everything.
-//! struct Quiet;
-//!
-//! impl TrainObserver for Quiet {
-//!     fn step(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
-//!     fn damaged(&mut self, _: u64, _: &str) {}
-//!     fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
-//!     fn saved(&mut self, _: u64, _: &Path) {}
-//! }
-//!
-//! fn main() -> Result<(), TrainError> {
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     let settings = read_settings::<DecomposeSettings>(Path::new("settings.toml"))?;
-//!     let run = settings.run.clone();
+//!     let table = toml::Table::try_from(&settings)?;
 //!     let resources = Resources { device: Device::Cpu, workers: 2, stop: Arc::default() };
 //!     let stop = Arc::clone(&resources.stop);
 //!     let mut task = DecomposeTask::new(settings, resources, None)?;
-//!     let outcome = Run::open(&mut task, &run, Path::new("run"), true, None)?.finish(&stop, &mut Quiet)?;
+//!     let outcome = Run::open(&mut task, &table, Path::new("run"), true, None)?.finish(&stop, &mut |_, _| {})?;
 //!     println!("{} steps: {:?}", outcome.steps, outcome.weights);
 //!     Ok(())
 //! }
@@ -57,7 +46,7 @@ pub use engine::cuda::cuda_device;
 pub use engine::memory::keep_memory;
 pub use engine::metrics_log::{MetricsLog, TABLE};
 pub use engine::model::Model;
-pub use engine::run::{Run, RunOutcome, TrainObserver};
+pub use engine::run::{Run, RunOutcome, TrainEvent, TrainObserver};
 pub use engine::task::{Resources, StepLosses, TrainingTask, Validation};
 pub use engine::terms::LossTerms;
 pub use engine::trainable::Trainable;

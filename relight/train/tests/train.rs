@@ -6,7 +6,6 @@
     reason = "a test that cannot go on has failed"
 )]
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,7 +20,7 @@ use relight_train::{
     Adam, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings, DecomposeTask, MetricsLog,
     Model, PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings, PaperTask, Photographs,
     PredictedTensors, ProcessGroup, Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE,
-    TrainError, TrainObserver, Trainable, TrainingTask, TurnNetworkSettings, TurnNetworkTask,
+    TrainError, TrainEvent, Trainable, TrainingTask, TurnNetworkSettings, TurnNetworkTask,
     Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
@@ -165,22 +164,10 @@ fn resources() -> Resources {
     }
 }
 
-/// Stops a run after so many steps.
-struct StopAfter<'a> {
-    steps: u64,
-    stop: &'a AtomicBool,
-    damage: Vec<String>,
-}
-
-impl TrainObserver for StopAfter<'_> {
-    fn step(&mut self, step: u64, _: &BTreeMap<String, f64>) {
-        self.stop.store(step >= self.steps, Ordering::Relaxed);
-    }
-    fn damaged(&mut self, _: u64, what: &str) {
-        self.damage.push(what.to_owned());
-    }
-    fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
-    fn saved(&mut self, _: u64, _: &Path) {}
+/// The table of a run's settings.
+fn table_of(run: &RunSettings) -> toml::Table {
+    let run = toml::Value::try_from(run).unwrap();
+    toml::Table::from_iter([("run".to_owned(), run)])
 }
 
 fn make_run(
@@ -190,12 +177,13 @@ fn make_run(
     (resume, until): (bool, u64),
 ) -> Result<RunOutcome, TrainError> {
     let stop = AtomicBool::new(false);
-    let mut observer = StopAfter {
-        steps: until,
-        stop: &stop,
-        damage: Vec::new(),
+    let mut stop_after = |step, event: TrainEvent<'_>| {
+        if matches!(event, TrainEvent::Step(_)) {
+            stop.store(step >= until, Ordering::Relaxed);
+        }
     };
-    Run::open(task, settings, folder, resume, None)?.finish(&stop, &mut observer)
+    let run = Run::open(task, &table_of(settings), folder, resume, None)?;
+    run.finish(&stop, &mut stop_after)
 }
 
 /// The lines of a run's table, without the header.
@@ -510,18 +498,18 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
     let mut task =
         PaperTask::new(PaperPhase::Spec, paper_settings(6), resources(), &inputs).unwrap();
     let (folder, run) = (tempfile::tempdir().unwrap(), paper_settings(6).run);
-    let stop = AtomicBool::new(false);
-    let mut observer = StopAfter {
-        steps: u64::MAX,
-        stop: &stop,
-        damage: Vec::new(),
+    let (stop, mut damage) = (AtomicBool::new(false), Vec::new());
+    let mut observer = |_, event: TrainEvent<'_>| {
+        if let TrainEvent::Damaged(what) = event {
+            damage.push(what.to_owned());
+        }
     };
-    let outcome = Run::open(&mut task, &run, folder.path(), false, None)
+    let outcome = Run::open(&mut task, &table_of(&run), folder.path(), false, None)
         .unwrap()
         .finish(&stop, &mut observer)
         .unwrap();
     assert_eq!(outcome.steps, 6);
-    assert!(!observer.damage.is_empty());
+    assert!(!damage.is_empty());
     assert!(outcome.damaged);
 }
 
@@ -548,12 +536,6 @@ impl TrainingTask for EverySecondStep {
     fn name(&self) -> &'static str {
         "every second step"
     }
-    fn settings(&self) -> String {
-        String::new()
-    }
-    fn differing_setting(&self, _: &str) -> Option<String> {
-        None
-    }
     fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
         Ok(())
     }
@@ -569,9 +551,7 @@ impl TrainingTask for EverySecondStep {
                 (Kind::Float, Device::Cpu),
             );
             let answer = &self.trainable.model.forward(&input)?[0];
-            losses
-                .terms
-                .add("square", 1.0, answer.square().mean(None))?;
+            losses.terms.add("square", 1.0, answer.square().mean(None));
         }
         Ok(losses)
     }
@@ -658,13 +638,15 @@ fn a_run_that_is_asked_to_stop_while_its_first_views_are_cast_stops_then() {
         std::thread::sleep(std::time::Duration::from_millis(200));
         asked.store(true, Ordering::Relaxed);
     });
-    let mut observer = StopAfter {
-        steps: u64::MAX,
-        stop: &AtomicBool::new(false),
-        damage: Vec::new(),
-    };
-    let run = Run::open(&mut task, &settings.run, folder.path(), false, None).unwrap();
-    let outcome = run.finish(&stop, &mut observer).unwrap();
+    let run = Run::open(
+        &mut task,
+        &table_of(&settings.run),
+        folder.path(),
+        false,
+        None,
+    )
+    .unwrap();
+    let outcome = run.finish(&stop, &mut |_, _| {}).unwrap();
     later.join().unwrap();
     assert_eq!((outcome.steps, outcome.stopped), (0, true));
     assert!(Checkpoint::path(folder.path()).is_file());
@@ -688,13 +670,15 @@ fn a_run_that_is_asked_to_stop_while_its_validation_is_cast_keeps_a_checkpoint()
     let stop = Arc::clone(&resources.stop);
     stop.store(true, Ordering::Relaxed);
     let mut task = TurnNetworkTask::new(settings.clone(), resources, None).unwrap();
-    let mut observer = StopAfter {
-        steps: u64::MAX,
-        stop: &AtomicBool::new(false),
-        damage: Vec::new(),
-    };
-    let run = Run::open(&mut task, &settings.run, folder.path(), false, None).unwrap();
-    let outcome = run.finish(&stop, &mut observer).unwrap();
+    let run = Run::open(
+        &mut task,
+        &table_of(&settings.run),
+        folder.path(),
+        false,
+        None,
+    )
+    .unwrap();
+    let outcome = run.finish(&stop, &mut |_, _| {}).unwrap();
     assert_eq!((outcome.steps, outcome.stopped), (0, true));
     assert!(Checkpoint::path(folder.path()).is_file());
 }

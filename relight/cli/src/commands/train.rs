@@ -1,6 +1,5 @@
 //! `relight train`.
 
-use std::collections::BTreeMap;
 use std::env;
 use std::error::Error;
 use std::io;
@@ -15,7 +14,7 @@ use clap::{Args, Subcommand};
 use relight_photo::nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    ProcessGroup, Resources, Run, RunOutcome, RunSettings, TrainError, TrainObserver, TrainingTask,
+    ProcessGroup, Resources, Run, RunOutcome, TrainError, TrainEvent, TrainingTask,
     TurnNetworkSettings, TurnNetworkTask, cuda_device, keep_memory, read_settings,
 };
 use relit_console::{Console, Outcome, ProgressBar};
@@ -177,37 +176,24 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 
 fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
     let settings: DecomposeSettings = arguments.settings()?;
-    let run = settings.run.clone();
-    train(
-        (settings, run),
-        arguments,
-        console,
-        |settings, resources| {
-            let weights = read_weights(arguments.weights.as_deref())?;
-            Ok(DecomposeTask::new(settings, resources, weights.as_ref())?)
-        },
-    )
+    train(settings, arguments, console, |settings, resources| {
+        let weights = read_weights(arguments.weights.as_deref())?;
+        Ok(DecomposeTask::new(settings, resources, weights.as_ref())?)
+    })
 }
 
 fn turn(arguments: &RunArguments, console: Console) -> CommandResult {
     let settings: TurnNetworkSettings = arguments.settings()?;
-    let run = settings.run.clone();
-    train(
-        (settings, run),
-        arguments,
-        console,
-        |settings, resources| {
-            let weights = read_weights(arguments.weights.as_deref())?;
-            Ok(TurnNetworkTask::new(settings, resources, weights.as_ref())?)
-        },
-    )
+    train(settings, arguments, console, |settings, resources| {
+        let weights = read_weights(arguments.weights.as_deref())?;
+        Ok(TurnNetworkTask::new(settings, resources, weights.as_ref())?)
+    })
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
     let own = &arguments.run;
     let settings = PaperSettings::from_phase(phase, own.settings.as_deref())?;
-    let run = settings.run.clone();
-    train((settings, run), own, console, |settings, resources| {
+    train(settings, own, console, |settings, resources| {
         let inputs = PaperInputs {
             turns: arguments.turns.clone(),
             validation_turns: arguments.validation_turns.clone(),
@@ -275,7 +261,7 @@ fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
 
 /// Runs a task and reports the outcome; or prints the settings.
 fn train<S: Serialize, T: TrainingTask>(
-    (settings, run): (S, RunSettings),
+    settings: S,
     arguments: &RunArguments,
     console: Console,
     task: impl FnOnce(S, Resources) -> Result<T, Box<dyn Error>>,
@@ -287,23 +273,20 @@ fn train<S: Serialize, T: TrainingTask>(
     }
     let (resources, group) = arguments.join(console)?;
     let stop = Arc::clone(&resources.stop);
+    let table = toml::Table::try_from(&settings)?;
     let mut task = task(settings, resources)?;
     let process = group.as_ref().map_or(0, |group| group.rank().index());
     let folder = arguments.folder()?;
-    let steps = run.steps;
-    let run = Run::open(&mut task, &run, folder, arguments.resume, group)?;
-    let bar = (process == 0).then(|| console.progress(steps, "train"));
+    let run = Run::open(&mut task, &table, folder, arguments.resume, group)?;
+    let bar = (process == 0).then(|| console.progress(run.steps(), "train"));
     if let Some(bar) = &bar {
         bar.set_position(run.steps_made());
         bar.reset_eta();
     }
-    let mut progress = RunProgress {
-        console,
-        process,
-        bar,
-    };
-    let outcome = run.finish(&stop, &mut progress)?;
-    if let Some(bar) = progress.bar {
+    let outcome = run.finish(&stop, &mut |step, event| {
+        show((step, event), bar.as_ref(), process, console);
+    })?;
+    if let Some(bar) = bar {
         bar.finish_and_clear();
         report(&outcome, console);
     }
@@ -356,56 +339,47 @@ fn report(outcome: &RunOutcome, console: Console) {
     );
 }
 
-/// Shows a run on the terminal. Processes other than the first have no bar, and report only what they alone know.
-struct RunProgress {
-    console: Console,
+/// Shows an event of a run on the terminal. Processes other than the first have no bar, and report only what they alone know.
+fn show(
+    (step, event): (u64, TrainEvent<'_>),
+    bar: Option<&ProgressBar>,
     process: u32,
-    bar: Option<ProgressBar>,
-}
-
-impl TrainObserver for RunProgress {
-    fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>) {
-        let Some(bar) = &self.bar else { return };
-        if let Some(loss) = losses.get("loss") {
-            bar.set_message(format!("train, loss {loss:.3}"));
+    console: Console,
+) {
+    let Some(bar) = bar else {
+        if let TrainEvent::Damaged(what) = event {
+            let event =
+                json!({ "event": "damaged", "step": step, "process": process, "message": what });
+            let line = format!("step {step}, process {process}: left out: {what}");
+            console.warn_with(&line, &event);
         }
-        bar.set_position(step);
-    }
-
-    fn damaged(&mut self, step: u64, what: &str) {
-        let process = self.process;
-        match &self.bar {
-            Some(bar) => {
-                let event = json!({ "event": "damaged", "step": step, "message": what });
-                let line = format!("step {step}: left out: {what}");
-                bar.suspend(|| self.console.warn_with(&line, &event));
+        return;
+    };
+    match event {
+        TrainEvent::Step(losses) => {
+            if let Some(loss) = losses.get("loss") {
+                bar.set_message(format!("train, loss {loss:.3}"));
             }
-            None => {
-                let event = json!({ "event": "damaged", "step": step, "process": process, "message": what });
-                let line = format!("step {step}, process {process}: left out: {what}");
-                self.console.warn_with(&line, &event);
-            }
+            bar.set_position(step);
         }
-    }
-
-    fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {
-        let Some(bar) = self.bar.as_ref().filter(|_| !figures.is_empty()) else {
-            return;
-        };
-        let text: Vec<String> = figures
-            .iter()
-            .map(|(name, value)| format!("{name} {value:.4}"))
-            .collect();
-        let event = json!({ "event": "validated", "step": step, "figures": figures });
-        let line = format!("step {step}: {}", text.join(", "));
-        bar.suspend(|| self.console.print(&line, &event));
-    }
-
-    fn saved(&mut self, step: u64, path: &Path) {
-        if self.console.is_json() && self.bar.is_some() {
+        TrainEvent::Damaged(what) => {
+            let event = json!({ "event": "damaged", "step": step, "message": what });
+            let line = format!("step {step}: left out: {what}");
+            bar.suspend(|| console.warn_with(&line, &event));
+        }
+        TrainEvent::Validated(figures) if !figures.is_empty() => {
+            let text: Vec<String> = figures
+                .iter()
+                .map(|(name, value)| format!("{name} {value:.4}"))
+                .collect();
+            let event = json!({ "event": "validated", "step": step, "figures": figures });
+            let line = format!("step {step}: {}", text.join(", "));
+            bar.suspend(|| console.print(&line, &event));
+        }
+        TrainEvent::Saved(path) if console.is_json() => {
             let path = path.display().to_string();
-            let event = json!({ "event": "saved", "step": step, "path": path });
-            self.console.print("", &event);
+            console.print("", &json!({ "event": "saved", "step": step, "path": path }));
         }
+        TrainEvent::Validated(_) | TrainEvent::Saved(_) => {}
     }
 }

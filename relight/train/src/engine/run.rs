@@ -22,24 +22,28 @@ use super::task::{StepLosses, TrainingTask, Validation};
 use crate::distributed::agreement::{Fact, agree, fingerprint};
 use crate::distributed::process_group::ProcessGroup;
 use crate::error::TrainError;
-use crate::settings::RunSettings;
+use crate::settings::{RunSettings, first_difference};
 use relight_photo::nets::WeightPrecision;
 
 /// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
 const SUCCESSION: Duration = Duration::from_secs(3);
 
-/// Events of a run.
-pub trait TrainObserver {
-    /// A step was made. `losses` have their weights.
-    fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
-    /// Something in the data of a step is damaged, and was left out.
-    fn damaged(&mut self, step: u64, what: &str);
-    /// The networks were validated.
-    fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>);
+/// An event of a run, after so many steps.
+#[derive(Debug, Clone, Copy)]
+pub enum TrainEvent<'a> {
+    /// A step was made: its losses, with their coefficients.
+    Step(&'a BTreeMap<String, f64>),
+    /// Something in the data is damaged, and was left out.
+    Damaged(&'a str),
+    /// The networks were validated: the figures.
+    Validated(&'a BTreeMap<String, f64>),
     /// The run was saved.
-    fn saved(&mut self, step: u64, path: &Path);
+    Saved(&'a Path),
 }
+
+/// Is told of each event, and the number of its step.
+pub type TrainObserver<'a> = &'a mut dyn FnMut(u64, TrainEvent<'_>);
 
 /// How a run came out.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +63,9 @@ pub struct RunOutcome {
 /// A run in its folder.
 pub struct Run<'a> {
     task: &'a mut dyn TrainingTask,
-    settings: &'a RunSettings,
+    settings: RunSettings,
+    /// All settings that determine the run, as TOML.
+    table: String,
     folder: &'a Path,
     group: Option<ProcessGroup>,
     /// Of the first process.
@@ -76,19 +82,24 @@ pub struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// Begins a run in a folder, or resumes the existing one (`resume`); among the processes of a group, all of
-    /// which open it with the same arguments.
+    /// which open it with the same arguments. `settings` are those that determine the run; `run` has the [`RunSettings`].
     ///
     /// # Errors
     /// [`TrainError::Refused`] if there is one without `resume`, or another one; [`TrainError::Io`],
     /// [`TrainError::ProcessLost`].
     pub fn open(
         task: &'a mut dyn TrainingTask,
-        settings: &'a RunSettings,
+        settings: &toml::Table,
         folder: &'a Path,
         resume: bool,
         group: Option<ProcessGroup>,
     ) -> Result<Self, TrainError> {
-        settings.check()?;
+        let run = settings.get("run").cloned();
+        let run = run.unwrap_or_else(|| toml::Table::new().into());
+        let run: RunSettings = run.try_into().map_err(|fault: toml::de::Error| {
+            TrainError::Refused(format!("[run] is not right: {}", fault.message()))
+        })?;
+        run.check()?;
         fs::create_dir_all(folder).map_err(TrainError::io(folder, "made"))?;
         let inputs = task.inputs()?;
         let step = match Checkpoint::read(folder)? {
@@ -99,10 +110,11 @@ impl<'a> Run<'a> {
                     folder.display()
                 )));
             }
-            Some(checkpoint) => load_state(task, &inputs, &checkpoint, folder)?,
+            Some(checkpoint) => load_state(task, (settings, &inputs), &checkpoint, folder)?,
         };
+        let table = settings.to_string();
         if let Some(group) = &group {
-            agree(group, &facts(task, &inputs, step)?)?;
+            agree(group, &facts(task, (&table, &inputs), step)?)?;
             task.join(group)?;
         }
         let is_first = group.as_ref().is_none_or(ProcessGroup::is_first);
@@ -110,7 +122,8 @@ impl<'a> Run<'a> {
             inputs,
             cursor: task.cursor(),
             task,
-            settings,
+            settings: run,
+            table,
             folder,
             group,
             metrics_log: is_first
@@ -120,6 +133,11 @@ impl<'a> Run<'a> {
             step,
             damaged: false,
         })
+    }
+
+    /// Steps of the whole run.
+    pub fn steps(&self) -> u64 {
+        self.settings.steps
     }
 
     /// Steps made so far.
@@ -137,7 +155,7 @@ impl<'a> Run<'a> {
     pub fn finish(
         mut self,
         stop: &AtomicBool,
-        observer: &mut dyn TrainObserver,
+        observer: TrainObserver<'_>,
     ) -> Result<RunOutcome, TrainError> {
         let figures = match self.make_steps(stop, observer) {
             Ok(figures) => figures,
@@ -168,12 +186,12 @@ impl<'a> Run<'a> {
     fn make_steps(
         &mut self,
         stop: &AtomicBool,
-        observer: &mut dyn TrainObserver,
+        observer: TrainObserver<'_>,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
         if self.metrics_log.is_some() {
             for left_out in self.task.left_out() {
                 self.damaged = true;
-                observer.damaged(self.step, &left_out.to_string());
+                observer(self.step, TrainEvent::Damaged(&left_out.to_string()));
             }
         }
         let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
@@ -212,16 +230,12 @@ impl<'a> Run<'a> {
     }
 
     /// Makes a step; whether one of the processes was asked to stop.
-    fn make_step(
-        &mut self,
-        stop: bool,
-        observer: &mut dyn TrainObserver,
-    ) -> Result<bool, TrainError> {
-        let learning_rate = learning_rate(self.settings, self.step);
+    fn make_step(&mut self, stop: bool, observer: TrainObserver<'_>) -> Result<bool, TrainError> {
+        let learning_rate = learning_rate(&self.settings, self.step);
         let losses = guarded(|| self.task.step(self.step))?;
         if let Some(damage) = &losses.damage {
             self.damaged = true;
-            observer.damaged(self.step, damage);
+            observer(self.step, TrainEvent::Damaged(damage));
         }
         let reduced = AllReducedLosses::new(&losses, stop, self.group.as_ref())?;
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
@@ -257,10 +271,10 @@ impl<'a> Run<'a> {
         &mut self,
         reduced: &AllReducedLosses,
         (learning_rate, gradient_norm): (f64, f64),
-        observer: &mut dyn TrainObserver,
+        observer: TrainObserver<'_>,
     ) -> Result<(), TrainError> {
         let step = self.step + 1;
-        observer.step(step, &reduced.values);
+        observer(step, TrainEvent::Step(&reduced.values));
         let Some(metrics_log) = &mut self.metrics_log else {
             return Ok(());
         };
@@ -274,7 +288,7 @@ impl<'a> Run<'a> {
     }
 
     /// Ends the run after another process was lost: the first of the remaining processes saves it.
-    fn end_early(&mut self, lost: TrainError, observer: &mut dyn TrainObserver) -> TrainError {
+    fn end_early(&mut self, lost: TrainError, observer: TrainObserver<'_>) -> TrainError {
         let path = Checkpoint::path(self.folder);
         let path = path.display();
         let saved = match self.save_as_successor(observer) {
@@ -288,7 +302,7 @@ impl<'a> Run<'a> {
     }
 
     /// Saves the run in process 0, and in others where that has ended and has not.
-    fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+    fn save_as_successor(&mut self, observer: TrainObserver<'_>) -> Result<(), TrainError> {
         if self.metrics_log.is_none() {
             let begun = Instant::now();
             while MetricsLog::is_open(self.folder)
@@ -312,7 +326,7 @@ impl<'a> Run<'a> {
 
     fn validate(
         &mut self,
-        observer: &mut dyn TrainObserver,
+        observer: TrainObserver<'_>,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
         let Some(metrics_log) = &mut self.metrics_log else {
             return Ok(BTreeMap::new());
@@ -328,7 +342,7 @@ impl<'a> Run<'a> {
         };
         if let Some(damage) = damage {
             self.damaged = true;
-            observer.damaged(self.step, &damage);
+            observer(self.step, TrainEvent::Damaged(&damage));
         }
         let named: BTreeMap<String, f64> = figures
             .iter()
@@ -340,22 +354,22 @@ impl<'a> Run<'a> {
             relit_data::durable::write_whole(&path, &png)
                 .map_err(TrainError::io(&path, "written"))?;
         }
-        observer.validated(self.step, &figures);
+        observer(self.step, TrainEvent::Validated(&figures));
         Ok(figures)
     }
 
-    fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+    fn save(&mut self, observer: TrainObserver<'_>) -> Result<(), TrainError> {
         let state = self.task.trainable().state()?;
         Checkpoint {
             task: self.task.name().to_owned(),
             step: self.step,
-            settings: self.task.settings(),
+            settings: self.table.clone(),
             inputs: self.inputs.clone(),
             cursor: self.cursor.clone(),
             state,
         }
         .write(self.folder)?;
-        observer.saved(self.step, &Checkpoint::path(self.folder));
+        observer(self.step, TrainEvent::Saved(&Checkpoint::path(self.folder)));
         Ok(())
     }
 
@@ -372,12 +386,16 @@ impl<'a> Run<'a> {
 }
 
 /// Facts that have to be equal in all processes.
-fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
+fn facts(
+    task: &mut dyn TrainingTask,
+    (settings, inputs): (&str, &str),
+    step: u64,
+) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
     let weights = fingerprint(task.trainable().model.parameters())?;
     Ok(vec![
         ("version and task", version),
-        ("the settings", task.settings()),
+        ("the settings", settings.to_owned()),
         (
             "the turns and the networks that are given",
             inputs.to_owned(),
@@ -390,7 +408,7 @@ fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fac
 /// Brings a task to a checkpoint; its step.
 fn load_state(
     task: &mut dyn TrainingTask,
-    inputs: &str,
+    (settings, inputs): (&toml::Table, &str),
     checkpoint: &Checkpoint,
     folder: &Path,
 ) -> Result<u64, TrainError> {
@@ -402,7 +420,7 @@ fn load_state(
             task.name()
         )));
     }
-    if let Some(setting) = task.differing_setting(&checkpoint.settings) {
+    if let Some(setting) = first_difference(settings, &checkpoint.settings) {
         return Err(other(format!("its settings differ: {setting}")));
     }
     if checkpoint.inputs != inputs {

@@ -28,12 +28,6 @@ pub trait TrainingTask {
     /// Its name, as on the command line.
     fn name(&self) -> &'static str;
 
-    /// The settings that determine the run, as TOML.
-    fn settings(&self) -> String;
-
-    /// The first setting that another run's settings have otherwise.
-    fn differing_setting(&self, other: &str) -> Option<String>;
-
     /// A text that identifies the inputs, apart from the settings and the trained weights.
     ///
     /// # Errors

@@ -51,15 +51,11 @@ fn put_over(table: &mut toml::Table, other: toml::Table) {
     }
 }
 
-/// The first setting, such as `run.seed`, that another run's settings have otherwise, or why they are none; `None` where
-/// all that count are the same. What their text does not name has its default, as in a file.
-pub(crate) fn first_difference<S: Serialize + DeserializeOwned>(
-    own: &S,
-    other: &str,
-) -> Option<String> {
-    let table = |settings: &S| toml::Table::try_from(settings).unwrap_or_default();
-    match toml::from_str::<S>(other) {
-        Ok(other) => differing_name("", &table(own), &table(&other)),
+/// The first setting, such as `run.seed`, that the text of another run's settings has otherwise, or why it has none; `None`
+/// where all that count are the same.
+pub(crate) fn first_difference(own: &toml::Table, other: &str) -> Option<String> {
+    match toml::from_str(other) {
+        Ok(other) => differing_name("", own, &other),
         Err(fault) => Some(fault.message().to_owned()),
     }
 }

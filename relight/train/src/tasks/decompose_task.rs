@@ -1,6 +1,5 @@
 //! The run that trains the decomposing network on photographs of synthetic objects.
 
-use tch::Tensor;
 
 use super::contact_sheet::validation_sheet;
 use super::decompose::{PredictedTensors, decompose_losses};
@@ -13,7 +12,7 @@ use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
 use crate::engine::tensors::grey;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
-use crate::settings::{DecomposeSettings, first_difference};
+use crate::settings::DecomposeSettings;
 use relight_photo::nets::{Weights, decomposer_with_heads};
 use relight_synth::SkippedFile;
 
@@ -59,15 +58,6 @@ impl DecomposeTask {
 impl TrainingTask for DecomposeTask {
     fn name(&self) -> &'static str {
         "decompose"
-    }
-
-    fn settings(&self) -> String {
-        // Numbers, names and paths: all of them can be written.
-        toml::to_string(&self.settings).unwrap_or_default()
-    }
-
-    fn differing_setting(&self, other: &str) -> Option<String> {
-        first_difference(&self.settings, other)
     }
 
     fn left_out(&self) -> &[SkippedFile] {

@@ -14,7 +14,7 @@ use crate::engine::losses::Mean;
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
-use crate::settings::{PaperPhase, PaperSettings, first_difference};
+use crate::settings::{PaperPhase, PaperSettings};
 use relight_core::reader::Rank;
 use relight_synth::{SkippedFile, stream};
 
@@ -143,15 +143,6 @@ impl PaperTask {
 impl TrainingTask for PaperTask {
     fn name(&self) -> &'static str {
         self.networks.phase.name()
-    }
-
-    fn settings(&self) -> String {
-        // Numbers, names and paths: all of them can be written.
-        toml::to_string(&self.settings).unwrap_or_default()
-    }
-
-    fn differing_setting(&self, other: &str) -> Option<String> {
-        first_difference(&self.settings, other)
     }
 
     fn left_out(&self) -> &[SkippedFile] {

@@ -10,7 +10,7 @@ use crate::engine::tensors::over_channels;
 use crate::engine::terms::LossTerms;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
-use crate::settings::{TurnNetworkSettings, first_difference};
+use crate::settings::TurnNetworkSettings;
 use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
 use relight_synth::{SkippedFile, stream};
 
@@ -115,15 +115,6 @@ fn expected_error(normals: &Tensor, log_chord: &Tensor, batch: &TurnBatch) -> Me
 impl TrainingTask for TurnNetworkTask {
     fn name(&self) -> &'static str {
         "turn"
-    }
-
-    fn settings(&self) -> String {
-        // Numbers, names and paths: all of them can be written.
-        toml::to_string(&self.settings).unwrap_or_default()
-    }
-
-    fn differing_setting(&self, other: &str) -> Option<String> {
-        first_difference(&self.settings, other)
     }
 
     fn left_out(&self) -> &[SkippedFile] {
