@@ -36,6 +36,5 @@ fn _relit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rendering::render, module)?)?;
     module.add_function(wrap_pyfunction!(rendering::to_srgb8, module)?)?;
     module.add_function(wrap_pyfunction!(rendering::to_srgb16, module)?)?;
-    module.add_function(wrap_pyfunction!(networks::network_maps, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }
