@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             least(steps, || {
                 let answer = model.forward(&pictures)?;
                 answer[0].f_square()?.f_mean(None)?.f_backward()?;
-                adam.step(model.parameters(), 1e-3, 1.0)?;
+                adam.step(model.parameters(), 1e-3)?;
                 Ok(())
             })?
         }

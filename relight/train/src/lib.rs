@@ -52,9 +52,8 @@ pub use engine::terms::LossTerms;
 pub use engine::trainable::Trainable;
 pub use error::TrainError;
 pub use settings::{
-    ComputePrecision, DataSettings, DecomposeLossCoefficients, DecomposeSettings,
-    PaperLossCoefficients, PaperPhase, PaperSettings, RunSettings, TurnNetworkSettings,
-    TurnSettings, read_settings,
+    ComputePrecision, DataSettings, DecomposeSettings, PaperLossCoefficients, PaperPhase,
+    PaperSettings, RunSettings, TurnNetworkSettings, TurnSettings, read_settings,
 };
 pub use tasks::decompose::PredictedTensors;
 pub use tasks::decompose_task::DecomposeTask;

@@ -78,7 +78,7 @@ fn descend(model: &Model, adam: &mut Adam, steps: usize) -> Vec<f64> {
             let output = &model.forward(&picture).unwrap()[0];
             let loss = (output - 0.5).square().mean(None);
             loss.backward();
-            adam.step(model.parameters(), 1e-3, 1.0).unwrap();
+            adam.step(model.parameters(), 1e-3).unwrap();
             loss.double_value(&[])
         })
         .collect()
@@ -147,7 +147,6 @@ fn decompose_task(steps: u64) -> (DecomposeTask, RunSettings) {
     let settings = DecomposeSettings {
         run: small_run(steps),
         data: small_data(),
-        ..DecomposeSettings::default()
     };
     let run = settings.run.clone();
     (
@@ -221,7 +220,6 @@ fn turn_task(steps: u64, workers: usize) -> (TurnNetworkTask, RunSettings) {
             first_views: Some(4),
             new_views: 1,
             rays: 16,
-            variants: 1,
             validation: 2,
             ..DataSettings::default()
         },
@@ -628,7 +626,6 @@ fn a_run_that_is_asked_to_stop_while_its_first_views_are_cast_stops_then() {
             rays: 4096,
             ..small_data()
         },
-        ..DecomposeSettings::default()
     };
     let (resources, folder) = (resources(), tempfile::tempdir().unwrap());
     let stop = Arc::clone(&resources.stop);
@@ -661,7 +658,6 @@ fn a_run_that_is_asked_to_stop_while_its_validation_is_cast_keeps_a_checkpoint()
             views: 4,
             first_views: Some(4),
             rays: 4096,
-            variants: 1,
             validation: 500,
             ..DataSettings::default()
         },

@@ -39,6 +39,9 @@ pub(super) trait PooledView: Sized + Send + 'static {
     fn plan(seed: u64, extra: &Self::Extra, rooms: &EnvironmentLights) -> Self::Plan;
 }
 
+/// Curves of brightness of each panorama.
+const VARIANTS: u32 = 8;
+
 /// The planes that do not depend on the material, one part.
 pub(super) const BASE: usize = 0;
 /// Materials, a part each.
@@ -145,7 +148,7 @@ impl<V: PooledView> ViewSource<V> {
             .filter_map(|number| library.panoramas.get(number))
             .collect();
         Self {
-            rooms: EnvironmentLights::new(&panoramas, settings.variants, seeds.rooms),
+            rooms: EnvironmentLights::new(&panoramas, VARIANTS, seeds.rooms),
             recipe: ViewRecipe {
                 seed: seeds.views,
                 size: settings.size,

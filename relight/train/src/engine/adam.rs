@@ -18,14 +18,18 @@ use relight_photo::nets::Weights;
 const STEPS: &str = "steps";
 const STEPS_PART: u64 = 1000;
 
+/// Part of the first moment that is kept at each step.
+const BETA1: f64 = 0.9;
+/// Gradients with a larger norm are scaled down to it.
+const MAX_GRAD_NORM: f64 = 1.0;
 /// Keeps the root of the second moment from being zero.
 const EPSILON: f64 = 1e-8;
 
 /// The optimiser with its memory.
 #[derive(Debug)]
 pub struct Adam {
-    /// Parts of the moments that are kept at each step.
-    betas: [f64; 2],
+    /// Part of the second moment that is kept at each step.
+    beta2: f64,
     weight_decay: f64,
     steps: u64,
     first: BTreeMap<String, Tensor>,
@@ -48,7 +52,7 @@ impl Adam {
                 .collect::<Result<BTreeMap<_, _>, TrainError>>()
         };
         Ok(Self {
-            betas: [run.beta1, run.beta2],
+            beta2: run.beta2,
             weight_decay: run.weight_decay,
             steps: 0,
             first: zeros()?,
@@ -90,7 +94,7 @@ impl Adam {
     }
 
     /// One step along the gradients of the parameters, which are forgotten then. Where their norm is larger than
-    /// `max_grad_norm`, they are scaled down to it first. Answers the norm that they had.
+    /// 1, they are scaled down to it first. Answers the norm that they had.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -98,27 +102,25 @@ impl Adam {
         &mut self,
         parameters: &BTreeMap<String, Tensor>,
         learning_rate: f64,
-        max_grad_norm: f64,
     ) -> Result<f64, TrainError> {
-        no_grad(|| self.step_without_gradient(parameters, learning_rate, max_grad_norm))
+        no_grad(|| self.step_without_gradient(parameters, learning_rate))
     }
 
     fn step_without_gradient(
         &mut self,
         parameters: &BTreeMap<String, Tensor>,
         learning_rate: f64,
-        max_grad_norm: f64,
     ) -> Result<f64, TrainError> {
         let norm = gradient_norm(parameters)?;
-        let shrink = if norm > max_grad_norm {
-            max_grad_norm / norm
+        let shrink = if norm > MAX_GRAD_NORM {
+            MAX_GRAD_NORM / norm
         } else {
             1.0
         };
         self.steps += 1;
-        let ([beta1, beta2], weight_decay) = (self.betas, self.weight_decay);
+        let (beta2, weight_decay) = (self.beta2, self.weight_decay);
         let steps = self.steps.min(i32::MAX as u64) as i32;
-        let (bias1, bias2) = (1.0 - beta1.powi(steps), 1.0 - beta2.powi(steps));
+        let (bias1, bias2) = (1.0 - BETA1.powi(steps), 1.0 - beta2.powi(steps));
         for (name, parameter) in parameters {
             let mut gradient = parameter.f_grad()?;
             let (Some(first), Some(second)) = (self.first.get_mut(name), self.second.get_mut(name))
@@ -129,7 +131,7 @@ impl Adam {
                 continue;
             }
             let _ = gradient.f_mul_scalar_(shrink)?;
-            let _ = first.f_lerp_(&gradient, 1.0 - beta1)?;
+            let _ = first.f_lerp_(&gradient, 1.0 - BETA1)?;
             let _ = second.f_lerp_(&gradient.f_square()?, 1.0 - beta2)?;
             // first / bias1 over (sqrt(second / bias2) + epsilon), with one division.
             let mut change = second.f_sqrt()?;

@@ -264,7 +264,7 @@ impl<'a> Run<'a> {
         if let Some(group) = &self.group {
             group.sum_gradients(trainable.model.parameters())?;
         }
-        trainable.step(learning_rate, self.settings.max_grad_norm)
+        trainable.step(learning_rate)
     }
 
     fn log(

@@ -49,14 +49,12 @@ impl Trainable {
         self.model.graph().name()
     }
 
-    /// One step along the gradients; their norm before they were scaled down to `max_grad_norm`.
+    /// One step along the gradients; their norm before they were scaled down to 1.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn step(&mut self, learning_rate: f64, max_grad_norm: f64) -> Result<f64, TrainError> {
-        let norm = self
-            .adam
-            .step(self.model.parameters(), learning_rate, max_grad_norm)?;
+    pub fn step(&mut self, learning_rate: f64) -> Result<f64, TrainError> {
+        let norm = self.adam.step(self.model.parameters(), learning_rate)?;
         // In the first steps it forgets faster, so that it does not remember the initial weights.
         let step = self.adam.steps() as f64;
         let decay = self.ema_decay.min((1.0 + step) / (10.0 + step));

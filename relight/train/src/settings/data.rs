@@ -28,8 +28,6 @@ pub struct DataSettings {
     pub new_views: u64,
     /// Rays a pixel of a view.
     pub rays: u32,
-    /// Curves of brightness of each panorama.
-    pub variants: u32,
     /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
@@ -55,7 +53,6 @@ impl Default for DataSettings {
             first_views: None,
             new_views: 1,
             rays: 128,
-            variants: 8,
             meshes: None,
             textures: None,
             panoramas: None,
@@ -96,7 +93,6 @@ impl DataSettings {
         within("data.first_views", self.first_views(), 1..=self.views)?;
         within("data.new_views", self.new_views, 0..=MAX_SAMPLES)?;
         within("data.rays", self.rays, 16..=4096)?;
-        within("data.variants", self.variants, 1..=1000)?;
         within("data.validation", self.validation, 1..=MAX_VALIDATION)
     }
 

@@ -4,12 +4,11 @@
 //! | --- | --- |
 //! | `run` | how long and how fast a network learns: `[run]` |
 //! | `data` | views and rooms, turns: `[data]`, `[turns]` |
-//! | `loss`, `paper_phase`, `precision` | loss coefficients; the paper's phases; the precision of a run |
+//! | `paper_phase`, `precision` | the paper's phases; the precision of a run |
 //! | `file` | reading TOML, and how the settings of two runs differ |
 
 mod data;
 mod file;
-mod loss;
 mod paper_phase;
 mod precision;
 mod run;
@@ -27,7 +26,6 @@ use super::error::TrainError;
 pub use data::{DataSettings, TurnSettings};
 pub(super) use file::first_difference;
 pub use file::read_settings;
-pub use loss::DecomposeLossCoefficients;
 pub use paper_phase::PaperPhase;
 pub use precision::ComputePrecision;
 pub use run::RunSettings;
@@ -40,8 +38,6 @@ pub struct DecomposeSettings {
     pub run: RunSettings,
     /// On what.
     pub data: DataSettings,
-    /// Loss coefficients.
-    pub loss: DecomposeLossCoefficients,
 }
 
 /// The settings of `relight train turn`.
@@ -148,20 +144,7 @@ impl DecomposeSettings {
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
-        self.data.check_photographs()?;
-        let loss = &self.loss;
-        // A part of others: alone it counts nothing.
-        check_coefficient("loss.quotient", loss.quotient)?;
-        check_coefficients(&[
-            ("loss.whole", loss.whole),
-            ("loss.windows", loss.windows),
-            ("loss.gradient", loss.gradient),
-            ("loss.normals", loss.normals),
-            ("loss.highlight", loss.highlight),
-            ("loss.highlight_energy", loss.highlight_energy),
-            ("loss.paint", loss.paint),
-            ("loss.light", loss.light),
-        ])
+        self.data.check_photographs()
     }
 }
 

@@ -26,10 +26,6 @@ pub struct RunSettings {
     pub warmup_steps: u64,
     /// The learning rate at the end, as a part of the largest; it falls along a cosine. 1: it does not fall.
     pub min_lr_ratio: f64,
-    /// Gradients with a larger norm are scaled down to it.
-    pub max_grad_norm: f64,
-    /// Part of the first moment that Adam keeps.
-    pub beta1: f64,
     /// Part of the second moment that Adam keeps.
     pub beta2: f64,
     /// Part of the parameters that is taken off at each step, times the learning rate.
@@ -55,8 +51,6 @@ impl Default for RunSettings {
             learning_rate: 1e-3,
             warmup_steps: 100,
             min_lr_ratio: 0.02,
-            max_grad_norm: 1.0,
-            beta1: 0.9,
             beta2: 0.99,
             weight_decay: 1e-3,
             ema_decay: 0.998,
@@ -78,8 +72,6 @@ impl RunSettings {
         within("run.batch", self.batch, 1..=MAX_BATCH)?;
         positive("run.learning_rate", self.learning_rate)?;
         within("run.min_lr_ratio", self.min_lr_ratio, 0.0..=1.0)?;
-        positive("run.max_grad_norm", self.max_grad_norm)?;
-        within("run.beta1", self.beta1, 0.0..1.0)?;
         within("run.beta2", self.beta2, 0.0..1.0)?;
         within("run.weight_decay", self.weight_decay, 0.0..1.0)?;
         within("run.ema_decay", self.ema_decay, 0.0..1.0)?;

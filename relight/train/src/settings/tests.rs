@@ -19,10 +19,9 @@ fn phase_settings(phase: PaperPhase, text: &str) -> Result<PaperSettings, TrainE
 
 #[test]
 fn what_a_file_does_not_name_has_its_default() {
-    let settings = read("[run]\nsteps = 7\n[loss]\nnormals = 2.0").unwrap();
+    let settings = read("[run]\nsteps = 7\n").unwrap();
     assert_eq!(settings.run.steps, 7);
     assert_eq!(settings.run.batch, RunSettings::default().batch);
-    assert_eq!(settings.loss.normals, 2.0);
     assert_eq!(settings.data, DataSettings::default());
 }
 
@@ -69,7 +68,7 @@ fn the_setting_that_differs_is_named() {
 fn a_number_out_of_range_is_named() {
     for (text, name) in [
         ("[run]\nlearning_rate = -1.0", "run.learning_rate"),
-        ("[run]\nbeta1 = 1.0", "run.beta1"),
+        ("[run]\nbeta2 = 1.0", "run.beta2"),
         (
             "[run]\ncheckpoint_minutes = 1e300",
             "run.checkpoint_minutes",
@@ -89,32 +88,29 @@ fn a_number_out_of_range_is_named() {
 
 #[test]
 fn loss_coefficients_that_teach_nothing_are_named() {
-    let losses = DecomposeLossCoefficients::default();
-    let error = |loss: DecomposeLossCoefficients| {
-        let settings = DecomposeSettings {
+    let coefficients = PaperLossCoefficients::default();
+    let error = |loss: PaperLossCoefficients| {
+        let settings = PaperSettings {
             loss,
-            ..DecomposeSettings::default()
+            ..PaperSettings::default()
         };
         settings.check().map_err(|error| error.to_string())
     };
-    assert_eq!(error(losses), Ok(()));
-    for whole in [-1.0, f64::NAN, f64::INFINITY] {
-        let told = error(DecomposeLossCoefficients { whole, ..losses }).unwrap_err();
-        assert!(told.contains("loss.whole"), "{told}");
+    assert_eq!(error(coefficients), Ok(()));
+    for low_rank in [-1.0, f64::NAN, f64::INFINITY] {
+        let told = error(PaperLossCoefficients {
+            low_rank,
+            ..coefficients
+        });
+        assert!(
+            told.as_ref().unwrap_err().contains("loss.low_rank"),
+            "{told:?}"
+        );
     }
-    let quotient = -0.5;
-    assert!(error(DecomposeLossCoefficients { quotient, ..losses }).is_err());
-    let nothing = DecomposeLossCoefficients {
-        whole: 0.0,
-        quotient: 0.5,
-        windows: 0.0,
-        gradient: 0.0,
-        normals: 0.0,
-        highlight: 0.0,
-        highlight_energy: 0.0,
-        paint: 0.0,
-        light: 0.0,
+    let (low_rank, supervised) = (0.0, 0.0);
+    let nothing = PaperLossCoefficients {
+        low_rank,
+        supervised,
     };
-    let told = error(nothing).unwrap_err();
-    assert!(told.contains("loss"), "{told}");
+    assert!(error(nothing).unwrap_err().contains("loss"));
 }

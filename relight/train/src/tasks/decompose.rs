@@ -7,7 +7,6 @@ use crate::data::sample::TruthBatch;
 use crate::engine::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
 use crate::engine::tensors::{grey, over_channels};
 use crate::engine::terms::LossTerms;
-use crate::settings::DecomposeLossCoefficients;
 use relight_photo::decompose::{HIGHLIGHT_OFFSET, LOG_LUMINANCE, LOG_SHADING, MIN_FACING};
 
 /// Added to shading before its logarithm is taken.
@@ -22,6 +21,20 @@ const FULL_HIGHLIGHT: f64 = 0.1;
 const HIGHLIGHT_EMPHASIS: f64 = 8.0;
 /// Energy of a faint highlight, a pixel.
 const FAINT_ENERGY: f64 = 1e-4;
+
+/// Loss coefficients, those of the built-in weights: scale-invariant errors of shading and albedo; that of the picture over the
+/// shading, against albedo, in parts of the others; the same errors in windows; steps from pixel to pixel of log shading and log
+/// albedo; distance of the normals; mean error of the highlights; energy of that error; cross entropy of what is paint of a
+/// pixel's darkness; distance of the light.
+const WHOLE: f64 = 1.5;
+const QUOTIENT: f64 = 0.5;
+const WINDOWS: f64 = 0.75;
+const GRADIENT: f64 = 0.2;
+const NORMALS: f64 = 1.0;
+const HIGHLIGHT: f64 = 1.0;
+const HIGHLIGHT_ENERGY: f64 = 0.2;
+const PAINT: f64 = 0.1;
+const LIGHT: f64 = 0.1;
 
 /// The network's predictions as maps on tensors, `batch x channels x height x width`: what
 /// [`relight_photo::decompose::NetworkInput::decode`] makes of them one by one.
@@ -73,38 +86,28 @@ impl PredictedTensors {
 }
 
 /// The weighted losses of a batch.
-pub(crate) fn decompose_losses(
-    batch: &TruthBatch,
-    prediction: &PredictedTensors,
-    coefficients: &DecomposeLossCoefficients,
-) -> LossTerms {
+pub(crate) fn decompose_losses(batch: &TruthBatch, prediction: &PredictedTensors) -> LossTerms {
     let mut terms = LossTerms::default();
     let mask = &batch.mask;
     let (albedo, found_albedo) = (grey(&batch.albedo), grey(&prediction.albedo));
     let diffuse = (&batch.picture - &batch.highlight).clamp_min(0.0);
     let quotient = grey(&diffuse) / (&prediction.shading + DIVISOR_FLOOR);
 
-    let whole = coefficients.whole;
     let error = scale_invariant(&prediction.shading, &batch.shading, mask);
-    terms.add("shading", whole, error);
+    terms.add("shading", WHOLE, error);
     let error = scale_invariant(&prediction.albedo, &batch.albedo, mask);
-    terms.add("albedo", whole, error);
+    terms.add("albedo", WHOLE, error);
     let error = scale_invariant(&quotient, &albedo, mask);
-    terms.add("quotient", whole * coefficients.quotient, error);
+    terms.add("quotient", WHOLE * QUOTIENT, error);
 
     let height = mask.size()[2];
     let narrow = (height / 16).max(4);
     for (name, found, truth, part) in [
         ("shading_windows", &prediction.shading, &batch.shading, 1.0),
         ("albedo_windows", &found_albedo, &albedo, 1.0),
-        (
-            "quotient_windows",
-            &quotient,
-            &albedo,
-            coefficients.quotient,
-        ),
+        ("quotient_windows", &quotient, &albedo, QUOTIENT),
     ] {
-        let coefficient = coefficients.windows * part;
+        let coefficient = WINDOWS * part;
         let near = windowed(found, truth, mask, narrow);
         let far = windowed(found, truth, mask, 3 * narrow);
         terms.add(name, coefficient, &near + &far * 0.5);
@@ -117,7 +120,7 @@ pub(crate) fn decompose_losses(
         mask,
     );
     for mean in steps {
-        terms.add_mean("shading_steps", coefficients.gradient, mean);
+        terms.add_mean("shading_steps", GRADIENT, mean);
     }
     let steps = gradient(
         &log(&found_albedo, ALBEDO_FLOOR),
@@ -125,21 +128,21 @@ pub(crate) fn decompose_losses(
         mask,
     );
     for mean in steps {
-        terms.add_mean("albedo_steps", coefficients.gradient * 0.5, mean);
+        terms.add_mean("albedo_steps", GRADIENT * 0.5, mean);
     }
     let distance = chord(&prediction.normals, &batch.normals, mask);
-    terms.add_mean("normals", coefficients.normals, distance);
+    terms.add_mean("normals", NORMALS, distance);
     let highlight = highlight_error(&prediction.highlight, &batch.highlight, mask);
-    terms.add_mean("highlight", coefficients.highlight, highlight);
+    terms.add_mean("highlight", HIGHLIGHT, highlight);
     let energy = highlight_energy_error(batch, prediction);
-    terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
+    terms.add_mean("highlight_energy", HIGHLIGHT_ENERGY, energy);
     if let Some(logit) = &prediction.paint {
         let truth = ShadowVsPaint::new(&batch.albedo, &batch.shading, mask);
-        terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit));
+        terms.add_mean("paint", PAINT, truth.cross_entropy(logit));
     }
     if let Some(light) = &prediction.light {
         let distance = relative_distance(light, &batch.light);
-        terms.add_mean("light", coefficients.light, distance);
+        terms.add_mean("light", LIGHT, distance);
     }
     terms
 }

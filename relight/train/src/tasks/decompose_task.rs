@@ -1,6 +1,5 @@
 //! The run that trains the decomposing network on photographs of synthetic objects.
 
-
 use super::contact_sheet::validation_sheet;
 use super::decompose::{PredictedTensors, decompose_losses};
 use super::validation::{ValidationSamples, highlight_figures};
@@ -22,7 +21,6 @@ const SHOWN: usize = 10;
 /// Training of the decomposing network.
 #[derive(Debug)]
 pub struct DecomposeTask {
-    settings: DecomposeSettings,
     resources: Resources,
     trainable: Trainable,
     photographs: Photographs,
@@ -47,7 +45,6 @@ impl DecomposeTask {
         let trainable = Trainable::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             photographs,
-            settings,
             resources,
             trainable,
             validation,
@@ -77,7 +74,7 @@ impl TrainingTask for DecomposeTask {
         let output = self.trainable.model.forward(&batch.input)?;
         let prediction = PredictedTensors::from_outputs(&batch.input, &output);
         Ok(StepLosses {
-            terms: decompose_losses(&batch, &prediction, &self.settings.loss),
+            terms: decompose_losses(&batch, &prediction),
             damage: None,
         })
     }
