@@ -17,35 +17,33 @@ use crate::failure::{Failure, choice};
 /// How errors name a picture that is an array.
 const ARRAY: &str = "array";
 
-/// A picture from the package: a path, or a contiguous array of rows, columns and 3 or 4 channels.
-#[derive(FromPyObject)]
-pub(crate) enum PictureInput<'py> {
-    Path(PathBuf),
-    Bytes(PyReadonlyArray3<'py, u8>),
-    Words(PyReadonlyArray3<'py, u16>),
-    Light(PyReadonlyArray3<'py, f32>),
-}
-
-/// The same, copied: Python may change its array meanwhile.
+/// A picture from the package: a path, or a contiguous array of rows, columns and 3 or 4 channels, copied, as Python may change
+/// it meanwhile.
 pub(crate) enum Picture {
     File(PathBuf),
     Memory(DynamicImage),
 }
 
-impl PictureInput<'_> {
-    /// A copy.
-    pub(crate) fn owned(&self) -> PyResult<Picture> {
-        let image = match self {
-            Self::Path(path) => return Ok(Picture::File(path.clone())),
-            Self::Bytes(array) => copied(array, DynamicImage::ImageRgb8, DynamicImage::ImageRgba8)?,
-            Self::Words(array) => {
-                copied(array, DynamicImage::ImageRgb16, DynamicImage::ImageRgba16)?
-            }
-            Self::Light(array) => {
-                copied(array, DynamicImage::ImageRgb32F, DynamicImage::ImageRgba32F)?
-            }
+impl<'py> FromPyObject<'_, 'py> for Picture {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(path) = given.extract() {
+            return Ok(Self::File(path));
+        }
+        let image = if let Ok(array) = given.extract() {
+            copied::<u8>(&array, DynamicImage::ImageRgb8, DynamicImage::ImageRgba8)
+        } else if let Ok(array) = given.extract() {
+            copied::<u16>(&array, DynamicImage::ImageRgb16, DynamicImage::ImageRgba16)
+        } else {
+            let array = given.extract()?;
+            copied::<f32>(
+                &array,
+                DynamicImage::ImageRgb32F,
+                DynamicImage::ImageRgba32F,
+            )
         };
-        Ok(Picture::Memory(image))
+        image.map(Self::Memory)
     }
 }
 

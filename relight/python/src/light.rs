@@ -9,45 +9,38 @@ use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_photo::relighting::{DiscLamp, LightSource};
 
-use crate::arrays::{Picture, PictureInput};
+use crate::arrays::Picture;
 use crate::failure::Failure;
 
-/// Light from the package.
-#[derive(FromPyObject)]
-pub(crate) enum LightInput<'py> {
-    /// `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, and the ambient light.
-    Lamp(String, f64),
-    Coefficients(PyReadonlyArray2<'py, f64>),
-    /// A panorama, or a file of light.
-    Picture(PictureInput<'py>),
-}
-
-/// The same, copied: Python may change its array meanwhile.
+/// Light from the package: a lamp's `AZIMUTH,ELEVATION[,COLOUR][,SIZE]` and the ambient light, coefficients, a panorama, or a
+/// file. Arrays are copied, as Python may change them meanwhile.
 pub(crate) enum Light {
     Source(LightSource),
     File(PathBuf),
     Panorama(Picture),
 }
 
-impl LightInput<'_> {
-    /// A copy.
-    pub(crate) fn owned(&self) -> PyResult<Light> {
-        Ok(match self {
-            Self::Lamp(text, ambient) => {
-                let lamp: DiscLamp = text
-                    .parse()
-                    .map_err(|fault| PyValueError::new_err(format!("lamp: {fault}")))?;
-                let ambient = *ambient;
-                Light::Source(LightSource::Lamp(DiscLamp { ambient, ..lamp }))
-            }
-            Self::Coefficients(array) => {
-                let rows = coefficients(array)?;
-                let light = ShLight::new(rows);
-                let light = light.map_err(|error| PyValueError::new_err(error.to_string()))?;
-                Light::Source(LightSource::Coefficients(light))
-            }
-            Self::Picture(PictureInput::Path(path)) => Light::File(path.clone()),
-            Self::Picture(picture) => Light::Panorama(picture.owned()?),
+impl<'py> FromPyObject<'_, 'py> for Light {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok((text, ambient)) = given.extract::<(String, f64)>() {
+            let lamp: DiscLamp = text
+                .parse()
+                .map_err(|fault| PyValueError::new_err(format!("lamp: {fault}")))?;
+            return Ok(Self::Source(LightSource::Lamp(DiscLamp {
+                ambient,
+                ..lamp
+            })));
+        }
+        if let Ok(array) = given.extract() {
+            let light = ShLight::new(coefficients(&array)?);
+            let light = light.map_err(|error| PyValueError::new_err(error.to_string()))?;
+            return Ok(Self::Source(LightSource::Coefficients(light)));
+        }
+        Ok(match given.extract()? {
+            Picture::File(path) => Self::File(path),
+            picture => Self::Panorama(picture),
         })
     }
 }

@@ -19,21 +19,12 @@ use relight_photo::relighting::{
 use relit_data::geometry::Rect;
 use relit_grabcut::{Hints, Seeds, SegmentSettings, segment};
 
-use crate::arrays::{Array, Picture, PictureInput, read, transfer};
+use crate::arrays::{Array, Picture, read, transfer};
 use crate::failure::{Failure, choice, unlocked};
-use crate::light::LightInput;
+use crate::light::Light;
 use crate::networks::decomposer;
 
 /// A photograph from the package: the picture, its mask, a rectangle, and the encoding of integers.
-#[derive(FromPyObject)]
-pub(crate) struct PhotographInput<'py>(
-    PictureInput<'py>,
-    Option<PictureInput<'py>>,
-    Option<(i32, i32, u32, u32)>,
-    Option<String>,
-);
-
-/// The same, copied: Python may change its array meanwhile.
 pub(crate) struct Photograph {
     picture: Picture,
     mask: Option<Picture>,
@@ -41,13 +32,18 @@ pub(crate) struct Photograph {
     transfer: Option<Transfer>,
 }
 
-impl PhotographInput<'_> {
-    /// A copy.
-    pub(crate) fn owned(&self) -> PyResult<Photograph> {
-        let Self(picture, mask, rectangle, encoding) = self;
-        Ok(Photograph {
-            picture: picture.owned()?,
-            mask: mask.as_ref().map(PictureInput::owned).transpose()?,
+/// x, y, width and height.
+type Rectangle = (i32, i32, u32, u32);
+
+impl<'py> FromPyObject<'_, 'py> for Photograph {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let (picture, mask, rectangle, encoding): (_, _, Option<Rectangle>, Option<String>) =
+            given.extract()?;
+        Ok(Self {
+            picture,
+            mask,
             rectangle: rectangle.map(|(x, y, w, h)| Rect::new(x, y, w, h)),
             transfer: transfer(encoding.as_deref())?,
         })
@@ -94,11 +90,10 @@ fn gate(name: &str) -> PyResult<SpecularGate> {
 #[pyfunction]
 pub(crate) fn decompose<'py>(
     py: Python<'py>,
-    photograph: PhotographInput<'py>,
+    photograph: Photograph,
     highlights: &str,
     mirror: bool,
 ) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
-    let photograph = photograph.owned()?;
     let options = DecomposeOptions {
         mirror,
         specular: gate(highlights)?,
@@ -161,8 +156,8 @@ type RelitPictures<'py> = (Vec<Bound<'py, PyArrayDyn<f32>>>, Vec<String>);
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn relight<'py>(
     py: Python<'py>,
-    photograph: PhotographInput<'py>,
-    light: Option<LightInput<'py>>,
+    photograph: Photograph,
+    light: Option<Light>,
     turned: Vec<f64>,
     background: Option<String>,
     field: f64,
@@ -171,8 +166,6 @@ pub(crate) fn relight<'py>(
     size: Option<usize>,
     highlights: &str,
 ) -> PyResult<RelitPictures<'py>> {
-    let photograph = photograph.owned()?;
-    let light = light.map(|light| light.owned()).transpose()?;
     let white_balance = balance(white_balance)?;
     let choices = [
         ("photo", Behind::Photo),
@@ -262,16 +255,12 @@ fn balance(name: &str) -> PyResult<WhiteBalance> {
 #[pyfunction]
 pub(crate) fn insert<'py>(
     py: Python<'py>,
-    photographs: Vec<PhotographInput<'py>>,
-    into: PictureInput<'py>,
+    photographs: Vec<Photograph>,
+    into: Picture,
     scene: &str,
-    light: Option<LightInput<'py>>,
+    light: Option<Light>,
     highlights: &str,
 ) -> PyResult<(Bound<'py, PyArrayDyn<f32>>, Vec<String>)> {
-    let photographs = photographs.iter().map(PhotographInput::owned);
-    let photographs = photographs.collect::<PyResult<Vec<_>>>()?;
-    let into = into.owned()?;
-    let light = light.map(|light| light.owned()).transpose()?;
     let options = DecomposeOptions {
         specular: gate(highlights)?,
         ..DecomposeOptions::default()
@@ -341,13 +330,11 @@ fn background(picture: Picture, scene: &SceneDescription) -> Result<BackgroundFi
 #[pyfunction]
 pub(crate) fn mask<'py>(
     py: Python<'py>,
-    image: PictureInput<'py>,
-    rectangle: Option<(i32, i32, u32, u32)>,
-    seeds: Option<PictureInput<'py>>,
+    image: Picture,
+    rectangle: Option<Rectangle>,
+    seeds: Option<Picture>,
     keep_all: bool,
 ) -> PyResult<(Bound<'py, PyArrayDyn<bool>>, Vec<String>)> {
-    let image = image.owned()?;
-    let seeds = seeds.as_ref().map(PictureInput::owned).transpose()?;
     let (mask, warnings) = unlocked(py, || {
         let shown = image.colours(None)?.to_srgb();
         let extent = shown.planes().extent();

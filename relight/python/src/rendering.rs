@@ -14,7 +14,7 @@ use relight_photo::relighting::exposure_for_object;
 
 use crate::arrays::{Array, to_planes};
 use crate::failure::{Failure, choice, unlocked};
-use crate::light::LightInput;
+use crate::light::Light;
 
 /// Reflectance and smoothness from Python.
 type GlossInput<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray2<'py, f32>);
@@ -29,7 +29,7 @@ pub(crate) fn render<'py>(
     normals: PyReadonlyArray3<'py, f32>,
     albedo: PyReadonlyArray3<'py, f32>,
     gloss: Option<GlossInput<'py>>,
-    light: LightInput<'py>,
+    light: Light,
     order: usize,
     turned: Vec<f64>,
     exposure: Option<f32>,
@@ -47,7 +47,6 @@ pub(crate) fn render<'py>(
             Some((planes(&reflectance)?, smoothness))
         }
     };
-    let light = light.owned()?;
     let diffuse = [
         ("irradiance", DiffuseForm::Irradiance),
         ("released", DiffuseForm::Released),
