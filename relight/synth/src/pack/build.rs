@@ -15,7 +15,7 @@ use relit_data::shard::Digest;
 use super::candidates::{Candidate, Candidates};
 use super::codec::{PackedPanorama, decode_mesh, encode_panorama};
 use super::file::{PackedEntry, Parts, encode};
-use super::prepare::{PreparedObject, Reason};
+use super::prepare::{EXCLUDED, PreparedObject, REPEATED, Reason, UNREADABLE};
 use super::table::{Row, write_table};
 use super::{LibraryEntry, UNKNOWN};
 use crate::SynthError;
@@ -115,7 +115,7 @@ impl Building {
         let mut shapes: HashMap<Digest, String> = HashMap::new();
         for (candidate, prepared) in all.iter().zip(read.collect::<Vec<_>>()) {
             let prepared = prepared.and_then(|one| match shapes.get(&one.digest) {
-                Some(name) => Err(Reason::Repeated(name.clone())),
+                Some(name) => Err(Reason::new(REPEATED, name)),
                 None => Ok(one),
             });
             let prepared = match prepared {
@@ -154,7 +154,7 @@ impl Building {
                 let thumbnail = thumbnail(&panorama);
                 let mut others = thumbnails.iter();
                 match others.find(|(_, other)| are_alike(other, &thumbnail)) {
-                    Some((name, _)) => Err(Reason::Repeated(name.clone())),
+                    Some((name, _)) => Err(Reason::new(REPEATED, name)),
                     None => Ok((panorama, thumbnail)),
                 }
             });
@@ -171,17 +171,15 @@ impl Building {
     }
 
     fn leave_out(&mut self, what: &'static str, candidate: &Candidate, reason: &Reason) {
-        if let Reason::Repeated(name) = reason
-            && candidate.entry.is_for_validation
-        {
-            self.keep_apart(name);
+        if reason.kind == REPEATED && candidate.entry.is_for_validation {
+            self.keep_apart(&reason.detail);
         }
-        let kind = format!("{what}s: {}", reason.kind());
+        let kind = format!("{what}s: {}", reason.kind);
         *self.summary.left_out.entry(kind).or_default() += 1;
-        if let Reason::Unreadable(why) = reason {
+        if reason.kind == UNREADABLE {
             self.summary.faults.push(SkippedFile {
                 path: PathBuf::from(&candidate.entry.name),
-                what: format!("is left out: {why}"),
+                what: format!("is left out: {}", reason.detail),
             });
         }
         self.rows.push(Row {
@@ -251,7 +249,7 @@ impl PreparedObject {
         };
         decode_mesh(&self.mesh, &self.bytes, grey)
             .and_then(|raw| Mesh::new(raw, CREASE))
-            .map_err(Reason::Unreadable)?;
+            .map_err(Reason::unreadable)?;
         Ok(self)
     }
 }
@@ -259,10 +257,10 @@ impl PreparedObject {
 /// The panorama of a file, made small.
 fn small_panorama(candidate: &Candidate) -> Result<Panorama, Reason> {
     if let Some(why) = &candidate.leave_out {
-        return Err(Reason::Excluded(why.clone()));
+        return Err(Reason::new(EXCLUDED, why));
     }
     let panorama =
-        Panorama::read(&candidate.path).map_err(|fault| Reason::Unreadable(fault.to_string()))?;
+        Panorama::read(&candidate.path).map_err(|fault| Reason::unreadable(fault.to_string()))?;
     let rows = panorama.extent().height;
     let planes = panorama.image().planes();
     let is_black = |rows: Range<usize>| {
@@ -275,7 +273,7 @@ fn small_panorama(candidate: &Candidate) -> Result<Panorama, Reason> {
     // What was not photographed is black.
     if is_black(0..rows.div_ceil(8)) || is_black(rows - rows.div_ceil(8)..rows) {
         let why = "its upper or lower end is black: it does not show everything around";
-        return Err(Reason::Unreadable(why.to_owned()));
+        return Err(Reason::unreadable(why));
     }
     let is_large = panorama.extent().width > MAX_PANORAMA.width;
     Ok(if is_large {

@@ -31,46 +31,34 @@ const OF_ROOMS: [&str; 10] = [
 
 /// Why an object or a panorama is not part of a library.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Reason {
-    /// A wall, a window or a door, by its catalogue or its title.
-    PartOfRoom,
-    Flat,
-    CutOut,
-    TooDense(usize),
-    /// The name of the one that stays.
-    Repeated(String),
-    /// What its folder says.
-    Excluded(String),
-    Unreadable(String),
+pub(super) struct Reason {
+    /// What all for the same reason have in common.
+    pub(super) kind: &'static str,
+    /// A sentence; of what is there twice the name of the one that stays, of what cannot be read why.
+    pub(super) detail: String,
 }
 
+pub(super) const REPEATED: &str = "the same as another one";
+pub(super) const EXCLUDED: &str = "excluded by origin.toml";
+pub(super) const UNREADABLE: &str = "cannot be read";
+
 impl Reason {
-    /// What all for the same reason have in common.
-    pub(super) fn kind(&self) -> &'static str {
-        match self {
-            Self::PartOfRoom => "walls, windows and doors",
-            Self::Flat => "flat",
-            Self::CutOut => "pictures that are cut out, as of leaves",
-            Self::TooDense(_) => "too many triangles",
-            Self::Repeated(_) => "the same as another one",
-            Self::Excluded(_) => "excluded by origin.toml",
-            Self::Unreadable(_) => "cannot be read",
-        }
+    pub(super) fn new(kind: &'static str, detail: impl Into<String>) -> Self {
+        let detail = detail.into();
+        Self { kind, detail }
+    }
+
+    pub(super) fn unreadable(why: impl Into<String>) -> Self {
+        Self::new(UNREADABLE, why)
     }
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PartOfRoom => write!(f, "it is a wall, a window or a door"),
-            Self::Flat => write!(f, "it is flat"),
-            Self::CutOut => write!(f, "its pictures are cut out, which is not drawn"),
-            Self::TooDense(count) => {
-                write!(f, "it has {count} triangles, more than {MAX_TRIANGLES}")
-            }
-            Self::Repeated(name) => write!(f, "it is the same as {name}"),
-            Self::Excluded(why) => write!(f, "{why}"),
-            Self::Unreadable(why) => write!(f, "it cannot be read: {why}"),
+        match self.kind {
+            REPEATED => write!(f, "it is the same as {}", self.detail),
+            UNREADABLE => write!(f, "it cannot be read: {}", self.detail),
+            _ => f.write_str(&self.detail),
         }
     }
 }
@@ -94,38 +82,42 @@ impl PreparedObject {
     /// Why it is left out.
     pub(super) fn read(candidate: &Candidate) -> Result<Self, Reason> {
         if let Some(why) = &candidate.leave_out {
-            return Err(Reason::Excluded(why.clone()));
+            return Err(Reason::new(EXCLUDED, why));
         }
         if is_part_of_room(candidate) {
-            return Err(Reason::PartOfRoom);
+            let why = "it is a wall, a window or a door";
+            return Err(Reason::new("walls, windows and doors", why));
         }
         let bytes = std::fs::read(&candidate.path);
-        let bytes = bytes.map_err(|fault| Reason::Unreadable(fault.to_string()))?;
+        let bytes = bytes.map_err(|fault| Reason::unreadable(fault.to_string()))?;
         let raw = RawMesh::parsed(&candidate.path, &bytes);
-        let mut raw = raw.map_err(Reason::Unreadable)?;
+        let mut raw = raw.map_err(Reason::unreadable)?;
         for position in &mut raw.positions {
             *position = candidate.rotation * *position;
         }
-        let raw = repaired(raw).map_err(Reason::Unreadable)?;
+        let raw = repaired(raw).map_err(Reason::unreadable)?;
         Self::judged(raw)
     }
 
     fn judged(mut raw: RawMesh) -> Result<Self, Reason> {
         if raw.triangles.len() > MAX_TRIANGLES {
-            return Err(Reason::TooDense(raw.triangles.len()));
+            let count = raw.triangles.len();
+            let why = format!("it has {count} triangles, more than {MAX_TRIANGLES}");
+            return Err(Reason::new("too many triangles", why));
         }
         if is_flat(&raw) {
-            return Err(Reason::Flat);
+            return Err(Reason::new("flat", "it is flat"));
         }
         if is_cut_out(&raw) {
-            return Err(Reason::CutOut);
+            let why = "its pictures are cut out, which is not drawn";
+            return Err(Reason::new("pictures that are cut out, as of leaves", why));
         }
         raw.orient();
         let missing = std::mem::take(&mut raw.left_out);
-        let (mesh, bytes, pictures) = encode_mesh(&raw).map_err(Reason::Unreadable)?;
+        let (mesh, bytes, pictures) = encode_mesh(&raw).map_err(Reason::unreadable)?;
         let packed = |(image, kind): (Arc<TextureImage>, PictureKind)| {
             let packed = image.packed(kind, MAX_PICTURE_SIDE);
-            let unreadable = |fault| Reason::Unreadable(format!("a picture of it: {fault}"));
+            let unreadable = |fault| Reason::unreadable(format!("a picture of it: {fault}"));
             Ok::<_, Reason>((kind, packed.map_err(unreadable)?))
         };
         let positions = raw.positions.iter().flat_map(Vec3::to_array);
