@@ -20,16 +20,9 @@ pub(crate) struct TransferArgument {
 /// Which way maps of normals have y.
 #[derive(Args)]
 pub(crate) struct NormalsArgument {
-    /// Direction of y in the normals that are read [default: that of a known network, else up].
-    #[arg(long, value_name = "WAY", value_parser = one_of(NORMALS_Y))]
-    pub(crate) normals_y: Option<NormalsFrame>,
-}
-
-impl NormalsArgument {
-    /// The frame of normals whose file does not state it.
-    pub(crate) fn or_up(&self) -> NormalsFrame {
-        self.normals_y.unwrap_or(NormalsFrame::YUp)
-    }
+    /// Direction of y in the normals that are read.
+    #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
+    pub(crate) normals_y: NormalsFrame,
 }
 
 /// The weights of the network that a verb runs.

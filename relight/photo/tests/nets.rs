@@ -11,10 +11,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use relight_photo::nets::paper::{self, Head};
-use relight_photo::nets::{
-    Graph, Inference, NetError, Tensor, WeightPrecision, Weights, decomposer,
-    decomposer_with_heads, to_onnx,
-};
+use relight_photo::nets::{Graph, Inference, Tensor, Weights, decomposer};
 
 const SIDE: usize = 128;
 /// Of each output every thirteenth pixel is kept, in both directions.
@@ -99,25 +96,6 @@ fn our_network_answers_as_in_pytorch() {
 }
 
 #[test]
-fn one_file_of_half_precision_answers_pictures_of_any_size() {
-    let graph = decomposer_with_heads();
-    let weights = Weights::initial(&graph, 5);
-    let bytes = weights.to_safetensors(WeightPrecision::Half, None).unwrap();
-    let weights = Weights::from_bytes(&bytes).unwrap();
-    let facts = [("axes", "y up")];
-    let file = to_onnx(&graph, &weights, WeightPrecision::Half, &facts).unwrap();
-    assert!(file.len() < bytes.len() + 300_000, "{}", file.len());
-    let path = Path::new("relight.onnx");
-    for size in [(64, 32), (96, 128)] {
-        let input = &picture(graph.input_channels())[..graph.input_channels() * size.0 * size.1];
-        let channels = graph.input_channels();
-        let read = Inference::from_onnx(path, &file, channels, size, &[]).unwrap();
-        let own = Inference::new(&graph, &weights, size).unwrap();
-        assert_eq!(read.run(input).unwrap(), own.run(input).unwrap());
-    }
-}
-
-#[test]
 fn the_answer_is_the_same_on_any_number_of_threads() {
     let graph = decomposer();
     let weights = Weights::initial(&graph, 3);
@@ -158,66 +136,4 @@ fn half_precision_is_read_as_single() {
     let near = |(a, b): (&f32, &f32)| (a - b).abs() < 1e-2;
     let values = bfloat.get("bfloat").unwrap().values();
     assert!(wanted.values().iter().zip(values).all(near));
-}
-
-/// An ONNX file with the values of its tensors moved into `location`.
-fn with_weights_in(location: &str, onnx: &[u8], weights: &mut Vec<u8>) -> Vec<u8> {
-    use prost::Message;
-    use tract_onnx::pb::{ModelProto, StringStringEntryProto, tensor_proto::DataLocation};
-    let mut model = ModelProto::decode(onnx).unwrap();
-    for tensor in &mut model.graph.as_mut().unwrap().initializer {
-        let values = std::mem::take(&mut tensor.raw_data);
-        let entries = [
-            ("location", location.to_owned()),
-            ("offset", weights.len().to_string()),
-            ("length", values.len().to_string()),
-        ];
-        let entry = |(key, value): (&str, String)| StringStringEntryProto {
-            key: key.to_owned(),
-            value,
-        };
-        tensor.external_data = entries.map(entry).to_vec();
-        tensor.data_location = Some(DataLocation::External as i32);
-        weights.extend(values);
-    }
-    model.encode_to_vec()
-}
-
-#[test]
-fn an_onnx_file_may_keep_its_weights_in_files_beside_and_below_and_nowhere_else() {
-    let graph = decomposer();
-    let weights = Weights::initial(&graph, 5);
-    let plain = to_onnx(&graph, &weights, WeightPrecision::Single, &[]).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("m").join("net.onnx");
-    std::fs::create_dir_all(folder.path().join("m/w")).unwrap();
-    let prepare = |location: &str| {
-        let mut weights = Vec::new();
-        let onnx = with_weights_in(location, &plain, &mut weights);
-        assert!(onnx.len() < plain.len() / 4);
-        for file in ["m/w/b c.data", "m/beside.data", "outside.data"] {
-            std::fs::write(folder.path().join(file), &weights).unwrap();
-        }
-        std::fs::write(folder.path().join("m/short.data"), &weights[..9]).unwrap();
-        Inference::from_onnx(&path, &onnx, graph.input_channels(), (64, 64), &[])
-    };
-    let input = vec![0.5; graph.input_channels() * 64 * 64];
-    let wanted = Inference::new(&graph, &weights, (64, 64)).unwrap();
-    let wanted = wanted.run(&input).unwrap();
-    for location in ["w/b c.data", "./beside.data"] {
-        let found = prepare(location).unwrap().run(&input).unwrap();
-        assert_eq!(found[0].values(), wanted[0].values(), "{location}");
-    }
-    let outside = folder.path().join("outside.data").display().to_string();
-    for location in [
-        "../outside.data",
-        &outside,
-        "none.data",
-        "short.data",
-        "w",
-        "",
-    ] {
-        let refused = prepare(location);
-        assert!(matches!(refused, Err(NetError::File { .. })), "{location}");
-    }
 }

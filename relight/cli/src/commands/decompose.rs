@@ -1,6 +1,5 @@
 //! `relight decompose`: photographs into normals, albedo, shading, highlight and light.
 
-use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -15,7 +14,6 @@ use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
 use crate::folder::OutputFolder;
-use crate::inputs::NormalsArgument;
 use crate::photos::{NetworkArguments, PhotoArguments, name_lost, name_notes, outcome};
 
 /// Each photograph takes memory, gigabytes if it is large.
@@ -49,23 +47,12 @@ pub(crate) struct Arguments {
     /// Do not average with the mirror image: faster, and slightly worse.
     #[arg(long)]
     no_mirror: bool,
-    /// Take the normals from MoGe-2 or Metric3D, as published, or a network of 256 x 256 pixels.
-    #[arg(long, value_name = "FILE.onnx")]
-    normals: Option<PathBuf>,
-    #[command(flatten)]
-    normals_frame: NormalsArgument,
 }
 
 impl Arguments {
     /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
-        let faults = self.frames_fault().or_else(|| self.mask_fault());
-        faults.or_else(|| self.normals_fault())
-    }
-
-    fn normals_fault(&self) -> Option<String> {
-        let is_lone = self.normals.is_none() && self.normals_frame.normals_y.is_some();
-        is_lone.then(|| "--normals-y needs --normals".to_owned())
+        self.frames_fault().or_else(|| self.mask_fault())
     }
 
     fn frames_fault(&self) -> Option<String> {
@@ -105,26 +92,13 @@ impl Arguments {
             ..self.network.options()
         }
     }
-
-    /// The network, and how its weights are named.
-    fn decomposer(&self, console: Console) -> Result<(Decomposer, String), DecomposeError> {
-        let (weights, name) = self.network.weights()?;
-        let mut decomposer = Decomposer::new(&weights)?;
-        if let Some(path) = &self.normals {
-            decomposer.read_normals(path, self.normals_frame.normals_y)?;
-            let name = decomposer.normals_network().unwrap_or_default();
-            let event = json!({ "event": "normals", "file": path, "network": name });
-            console.print(&format!("{}: recognised as {name}", path.display()), &event);
-        }
-        Ok((decomposer, name))
-    }
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let found = (arguments.photos).find(arguments.count, &arguments.folder.output, console)?;
     let inputs = &found.inputs;
     let own_folders = inputs.len() > 1 || arguments.photos.has_set();
-    let run = Run::new(arguments, own_folders, console)?;
+    let run = Run::new(arguments, own_folders)?;
     if !run.own_folders
         && let [input] = inputs.as_slice()
     {
@@ -181,15 +155,11 @@ struct Run {
 }
 
 impl Run {
-    fn new(
-        arguments: &Arguments,
-        own_folders: bool,
-        console: Console,
-    ) -> Result<Self, Box<dyn Error>> {
-        let (decomposer, weights) = arguments.decomposer(console)?;
+    fn new(arguments: &Arguments, own_folders: bool) -> Result<Self, DecomposeError> {
+        let (weights, name) = arguments.network.weights()?;
         Ok(Self {
-            decomposer,
-            weights,
+            decomposer: Decomposer::new(&weights)?,
+            weights: name,
             options: arguments.options(),
             reading: arguments.photos.reading(),
             output: arguments.folder.output.clone(),

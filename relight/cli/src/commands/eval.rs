@@ -185,7 +185,7 @@ impl Arguments {
 
 impl EstimateArguments {
     fn predictions(&self) -> Vec<Predictions> {
-        let frame = self.normals_frame.or_up();
+        let frame = self.normals_frame.normals_y;
         let folder = |path: &PathBuf| Predictions::new(path.clone(), frame);
         self.predictions.iter().map(folder).collect()
     }

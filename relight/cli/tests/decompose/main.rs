@@ -12,7 +12,6 @@ mod faults;
 mod forms;
 mod masks;
 mod networks;
-mod onnx_file;
 mod program;
 mod results;
 mod shards;

@@ -1,20 +1,14 @@
 //! From a picture under a mask to its layers and its light.
 
-#[cfg(feature = "files")]
-use std::path::Path;
-
 use super::compose::{normalised, possible_highlight};
 use super::crop::{CropSquare, Window, cut_out, inside};
 use super::error::DecomposeError;
-use super::external_normals::ExternalNormals;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
 use super::network_output::{MapNetwork, NetworkEngine, PhotoPrediction, Scales, to_maps};
 use super::tiled_compose::{LayerPlan, MapUpscaler};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-#[cfg(feature = "files")]
-use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
@@ -128,15 +122,13 @@ pub struct Decomposer {
     scales: Scales,
     /// Whether the network separates paint from shadow.
     tells_paint: bool,
-    normals: Option<ExternalNormals>,
 }
 
 impl std::fmt::Debug for Decomposer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Decomposer")
             .field("side", &self.side())
-            .field("normals", &self.normals)
-            .finish()
+            .finish_non_exhaustive()
     }
 }
 
@@ -185,37 +177,7 @@ impl Decomposer {
         Self {
             scales: Scales { fine, coarse },
             tells_paint: false,
-            normals: None,
         }
-    }
-
-    /// Takes the normals of another network from now on, of an ONNX file.
-    ///
-    /// MoGe-2's and Metric3D's published files are known by the names of their inputs and outputs, and used as they are. Any
-    /// other takes one picture, 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers
-    /// with 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals (p, q, 1).
-    /// `frame` is the direction of y; by default that of a known network, else up.
-    ///
-    /// # Errors
-    /// If it cannot be read or run, or has other outputs; then nothing changes.
-    #[cfg(feature = "files")]
-    pub fn read_normals(
-        &mut self,
-        path: &Path,
-        frame: Option<NormalsFrame>,
-    ) -> Result<(), DecomposeError> {
-        let onnx = std::fs::read(path).map_err(|source| NetError::Io {
-            path: path.to_owned(),
-            doing: "read",
-            source,
-        })?;
-        self.normals = Some(ExternalNormals::new(path, &onnx, self.side(), frame)?);
-        Ok(())
-    }
-
-    /// The kind of network that [`Self::read_normals`] recognised, in words; `None` if none was read.
-    pub fn normals_network(&self) -> Option<&'static str> {
-        self.normals.as_ref().map(ExternalNormals::name)
     }
 
     /// Width and height of what the network sees, pixels.
@@ -255,9 +217,8 @@ impl Decomposer {
             &part,
             options.mirror,
         )?;
-        let fitted = self.fit(&whole, is_glossy)?;
-        let others = self.normals.as_ref().map(|_| fitted.normals.planes());
-        let maps = MapUpscaler::new(&whole.fields, others, &whole.mask, part);
+        let fitted = FittedLight::new(&whole, is_glossy)?;
+        let maps = MapUpscaler::new(&whole.fields, &whole.mask, part);
         let CutObject {
             picture,
             inside,
@@ -290,40 +251,6 @@ impl Decomposer {
             saturated_fraction,
             residual: layers.residual,
             light_residual: fitted.light_residual,
-        })
-    }
-
-    /// Fits light and gloss to the maps at the network's size.
-    fn fit(&self, whole: &PhotoPrediction, is_glossy: bool) -> Result<FittedLight, DecomposeError> {
-        let known = inside(&whole.mask);
-        let maps = to_maps(whole.fields.clone(), &known)?;
-        let others = match &self.normals {
-            Some(other) => other.run(&whole.picture, &known)?,
-            None => None,
-        };
-        let normals = others.unwrap_or(maps.normals);
-        let shading = normalised(maps.shading, &known);
-        let target = Rgb::new(in_colour(shading.clone()));
-        let steep = normals.clone().steeper(TILT);
-        let light_near = |predicted| light_of_shading(&steep, &target, &known, predicted);
-        let shading_light = light_near(None)?;
-        let light = match &whole.light {
-            Some(predicted) => light_near(Some(predicted))?,
-            None => shading_light.clone(),
-        };
-        let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&steep);
-        let gloss = if is_glossy {
-            let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
-            fit_gloss(&shading_light, &normals, &highlight)?
-        } else {
-            None
-        };
-        Ok(FittedLight {
-            light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
-            normals,
-            light,
-            shading_light,
-            gloss,
         })
     }
 }
@@ -397,13 +324,43 @@ pub(super) fn check_mask_size(found: Extent, expected: Extent) -> Result<(), Dec
     )))
 }
 
-/// Normals, light and gloss at the network's size.
+/// Light and gloss at the network's size.
 struct FittedLight {
-    normals: Normals<YUp>,
     light: ShLight,
     shading_light: ShLight,
     light_residual: f64,
     gloss: Option<FittedGloss>,
+}
+
+impl FittedLight {
+    /// Fits light and gloss to the maps at the network's size.
+    fn new(whole: &PhotoPrediction, is_glossy: bool) -> Result<Self, DecomposeError> {
+        let known = inside(&whole.mask);
+        let maps = to_maps(whole.fields.clone(), &known)?;
+        let normals = maps.normals;
+        let shading = normalised(maps.shading, &known);
+        let target = Rgb::new(in_colour(shading.clone()));
+        let steep = normals.clone().steeper(TILT);
+        let light_near = |predicted| light_of_shading(&steep, &target, &known, predicted);
+        let shading_light = light_near(None)?;
+        let light = match &whole.light {
+            Some(predicted) => light_near(Some(predicted))?,
+            None => shading_light.clone(),
+        };
+        let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&steep);
+        let gloss = if is_glossy {
+            let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
+            fit_gloss(&shading_light, &normals, &highlight)?
+        } else {
+            None
+        };
+        Ok(Self {
+            light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
+            light,
+            shading_light,
+            gloss,
+        })
+    }
 }
 
 /// A value as light: black if it is negative, infinite or NaN.

@@ -4,24 +4,14 @@
 //! content of a file.
 
 mod compose;
-#[cfg_attr(
-    not(feature = "files"),
-    allow(dead_code, reason = "other networks for normals come from files")
-)]
-mod convention;
 mod crop;
 mod decomposer;
 mod encoding;
 mod error;
-mod external_normals;
 mod gloss;
 mod light;
 mod mask;
 mod network_output;
-#[cfg_attr(
-    not(feature = "files"),
-    allow(dead_code, reason = "other networks for normals come from files")
-)]
 mod photo;
 #[cfg(test)]
 mod tests;

@@ -17,40 +17,24 @@ const ROWS: usize = 64;
 pub(super) struct MapUpscaler {
     /// They go on beyond the mask.
     fields: Fields,
-    /// Of another network, in place of the own ones.
-    normals: Option<Planes<3>>,
     /// Which part of the other size is wanted.
     part: Part,
 }
 
 impl MapUpscaler {
-    /// Of fields that are known inside a mask, and another network's normals, for a part of the square around the object.
-    pub(super) fn new(
-        fields: &Fields,
-        normals: Option<&Planes<3>>,
-        mask: &Planes<1>,
-        part: Part,
-    ) -> Self {
+    /// Of fields that are known inside a mask, for a part of the square around the object.
+    pub(super) fn new(fields: &Fields, mask: &Planes<1>, part: Part) -> Self {
+        let known = inside(mask);
+        let wanted = vec![true; known.len()];
         Self {
-            fields: everywhere(fields, mask),
-            normals: normals.map(|normals| everywhere(normals, mask)),
+            fields: fields.clone().extended(&known, &wanted),
             part,
         }
     }
 
     /// The maps of some rows, 0 outside the mask.
     fn maps(&self, rows: &Range<usize>, mask: &[bool]) -> Result<PredictedMaps, ImageError> {
-        let mut maps = to_maps(self.rows_of(&self.fields, rows), mask)?;
-        if let Some(normals) = &self.normals {
-            let mut vectors = self.rows_of(normals, rows);
-            for plane in vectors.planes_mut() {
-                for (value, &inside) in plane.iter_mut().zip(mask) {
-                    *value = if inside { *value } else { 0.0 };
-                }
-            }
-            maps.normals = Normals::new(vectors);
-        }
-        Ok(maps)
+        to_maps(self.rows_of(&self.fields, rows), mask)
     }
 
     /// Rows of an image in the other size. Of the image only the rows that they are made of are looked at.
@@ -73,13 +57,6 @@ impl MapUpscaler {
         };
         cut_rows(image, first..behind).resized_part(&source, &target)
     }
-}
-
-/// The image with the values at the mask's edge beyond it.
-fn everywhere<const C: usize>(image: &Planes<C>, mask: &Planes<1>) -> Planes<C> {
-    let known = inside(mask);
-    let wanted = vec![true; known.len()];
-    image.clone().extended(&known, &wanted)
 }
 
 fn cut_rows<const C: usize>(image: &Planes<C>, rows: Range<usize>) -> Planes<C> {

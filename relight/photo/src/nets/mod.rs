@@ -26,8 +26,6 @@ mod graph;
 mod inference;
 mod onnx;
 pub mod paper;
-mod signature;
-mod tract;
 mod turn_network;
 mod weights;
 
@@ -40,6 +38,5 @@ pub use error::NetError;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Parameter, Role, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};
-pub use signature::{OnnxSignature, OnnxValue};
 pub use turn_network::{ALBEDO_OUTPUTS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network};
 pub use weights::{Tensor, Weights};

@@ -78,7 +78,7 @@ impl ObjectArguments {
                 "give an object (object.relit, or a folder of relight turn or relight decompose), or --normals".into(),
             );
         };
-        let normals = match self.normals_frame.or_up() {
+        let normals = match self.normals_frame.normals_y {
             NormalsFrame::YUp => Normals::<YUp>::read(path)?,
             NormalsFrame::YDown => Normals::<YDown>::read(path)?.flipped(),
         };
@@ -182,7 +182,7 @@ mod tests {
             object: None,
             normals: Some(path),
             normals_frame: NormalsArgument {
-                normals_y: Some(NormalsFrame::YDown),
+                normals_y: NormalsFrame::YDown,
             },
             mask: None,
             albedo: Map::File(write("albedo.png", [0.5; 3])),
