@@ -5,7 +5,7 @@ use relight_photo::nets::{NetError, Weights};
 /// The weights of the decomposing network.
 ///
 /// # Errors
-/// [`NetError::File`] if the program was built with a damaged file.
+/// If the program was built with a damaged file.
 pub(crate) fn weights() -> Result<Weights, NetError> {
     let bytes = include_bytes!("../weights/decompose.safetensors");
     read("relight/cli/weights/decompose.safetensors", bytes)
@@ -22,8 +22,5 @@ pub(crate) fn turn_weights() -> Result<Weights, NetError> {
 
 /// Weights by their path in the repository.
 fn read(path: &str, bytes: &[u8]) -> Result<Weights, NetError> {
-    Weights::from_bytes(bytes).map_err(|fault| NetError::File {
-        path: path.into(),
-        fault,
-    })
+    Weights::from_bytes(bytes).map_err(|fault| NetError::file(path.as_ref(), fault))
 }

@@ -152,7 +152,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
     fs::write(folder.path("text.txt"), "1 2 3\n1 2\n").unwrap();
     huge(&folder.path("huge.png"));
     let one = "relight photos/one.png";
-    let dark = InsertError::Dark.to_string();
+    let dark = "the light is completely dark";
     for (command, code, named) in [
         (format!("{one} --lamp 30,40 -o o.png"), 1, "photos/one.png"),
         (

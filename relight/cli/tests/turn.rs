@@ -353,8 +353,5 @@ fn several_turns_are_refused() {
     fs::copy(&shard, folder.path().join("again.tar")).unwrap();
     fs::remove_file(folder.path().join("dataset.json")).unwrap();
     let error = read_curves(folder.path(), TableRotation::default(), &|_, _| {}).unwrap_err();
-    assert!(
-        matches!(error, TurnError::ManyTurns { found: 2, .. }),
-        "{error}"
-    );
+    assert!(error.to_string().contains("holds 2 turns"), "{error}");
 }

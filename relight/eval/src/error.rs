@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Extent, ImageError};
-use relight_core::reader::{DamagedSample, OpenError};
+use relight_core::reader::{DamagedSample, ReadError};
 
 /// Why something failed.
 type Cause = Box<dyn Error + Send + Sync>;
@@ -15,7 +15,7 @@ type Cause = Box<dyn Error + Send + Sync>;
 pub enum EvalError {
     /// The ground truth cannot be opened.
     #[error(transparent)]
-    Open(#[from] OpenError),
+    Open(#[from] ReadError),
     /// A sample of the ground truth cannot be read.
     #[error("the ground truth is damaged")]
     Damage(#[from] DamagedSample),

@@ -13,7 +13,7 @@ use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Planes, Rgb};
 use relight_core::light::Normals;
 use relight_core::render::{Gloss, Surface};
-use relight_photo::export::{ExportError, ObjectMesh, read_object, to_glb, to_layers};
+use relight_photo::export::{ObjectMesh, read_object, to_glb, to_layers};
 
 /// A ball of an albedo, glossy if asked for.
 fn ball(side: usize, is_glossy: bool) -> CapturedObject {
@@ -115,10 +115,10 @@ fn an_object_is_read_from_a_file_or_a_folder_and_from_nothing_else() {
     );
     let empty = tempfile::tempdir().unwrap();
     let error = read_object(empty.path()).unwrap_err();
-    assert!(matches!(error, ExportError::Source { .. }));
+    assert!(error.to_string().contains("holds no object"), "{error}");
     for missing in ["missing.relit", "missing"] {
         let error = read_object(&empty.path().join(missing)).unwrap_err();
-        assert!(matches!(error, ExportError::Missing(_)), "{error}");
+        assert!(error.to_string().contains("does not exist"), "{error}");
     }
 }
 
@@ -154,5 +154,5 @@ fn a_decomposition_has_the_brightness_that_its_figures_say() {
     );
     std::fs::write(&figures, r#"{"white": {"albedo": -1}}"#).unwrap();
     let error = read_object(folder.path()).unwrap_err();
-    assert!(matches!(error, ExportError::Source { .. }), "{error}");
+    assert!(error.to_string().contains("white.albedo"), "{error}");
 }

@@ -9,7 +9,7 @@ use numpy::{PyArray4, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use relight_core::reader::{
-    Cursor, Draw, DrawPlan, Encoding, OpenError, Rank, Source, Stream, Streaming, TurnBatch, Turns,
+    Cursor, Draw, DrawPlan, Encoding, Rank, ReadError, Source, Stream, Streaming, TurnBatch, Turns,
 };
 use relit_data::causes::with_causes;
 
@@ -149,6 +149,6 @@ fn array<'py>(
     values.to_pyarray(py).reshape(shape)
 }
 
-fn open_error(error: &OpenError) -> PyErr {
+fn open_error(error: &ReadError) -> PyErr {
     PyOSError::new_err(with_causes(error))
 }

@@ -17,7 +17,7 @@ pub enum TrainError {
     Synth(#[from] relight_synth::SynthError),
     /// A data set cannot be opened.
     #[error(transparent)]
-    Data(#[from] relight_core::reader::OpenError),
+    Data(#[from] relight_core::reader::ReadError),
     /// A sheet of predictions could not be encoded.
     #[error(transparent)]
     Encode(#[from] relit_data::shard::ShardError),

@@ -1,15 +1,13 @@
 //! Why a turn cannot be solved.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
 use relight_core::light::LightError;
-use relight_core::reader::OpenError;
+use relight_core::reader::ReadError;
 use relight_photo::decompose::DecomposeError;
-use relight_photo::files::MovieError;
 use relight_photo::nets::NetError;
 use relit_data::session::SessionError;
 
@@ -18,38 +16,10 @@ use relit_data::session::SessionError;
 pub enum TurnError {
     /// The shard cannot be opened.
     #[error(transparent)]
-    Open(#[from] OpenError),
-    /// The shard is damaged, and the rest of it cannot be solved.
-    #[error("{} is damaged ({damage}), and the rest of it cannot be solved", path.display())]
-    Damaged {
-        /// The shard.
-        path: PathBuf,
-        /// The first damage.
-        damage: String,
-        /// Why the rest cannot be solved.
-        source: Box<TurnError>,
-    },
-    /// There is more than one turn.
-    #[error("{} holds {found} turns: give the shard (.tar) of one", path.display())]
-    ManyTurns {
-        /// The data set.
-        path: PathBuf,
-        /// How many it has.
-        found: usize,
-    },
-    /// The frames do not make a turn, or a folder or a video is not the required one.
+    Open(#[from] ReadError),
+    /// Any other fault, as a sentence.
     #[error("{0}")]
     Refused(String),
-    /// A setting is beyond what may be given.
-    #[error("{what} is {value}: it has to be {allowed}")]
-    Setting {
-        /// Which setting.
-        what: &'static str,
-        /// What was given.
-        value: f64,
-        /// What may be given.
-        allowed: &'static str,
-    },
     /// No light fits the curves.
     #[error(
         "no light fits the turn: it is all dark or all clipped; change the exposure and capture it again"
@@ -64,26 +34,9 @@ pub enum TurnError {
     /// An image or a light cannot be read or written.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The object cannot be made a file.
-    #[error("the captured object cannot be written")]
-    Asset(#[source] Box<CapturedObjectError>),
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The session of a shard is not next to its data set.
-    #[error("the session or video from which {} was made is not next to its data set: give it with --session", .0.display())]
-    NoSession(PathBuf),
-    /// The ball is under the object's mask.
-    #[error(
-        "the object's mask covers {percent:.0} % of the ball at {given}: measure the ball's place again, or remove the ball \
-         from the mask"
-    )]
-    BallInMask {
-        /// The place that was given.
-        given: String,
-        /// The part of the ball that is covered.
-        percent: f64,
-    },
     /// The circle shows no ball.
     #[error(
         "the circle at {given} shows no ball: its light explains {explained:.0} % of the variation; measure it again, uncover \
@@ -106,12 +59,14 @@ pub enum TurnError {
         /// The parts of the variation that both explain, percent.
         explained: [f64; 2],
     },
-    /// A video cannot be read or written.
-    #[error(transparent)]
-    Movie(#[from] MovieError),
 }
 
 impl TurnError {
+    /// A setting is beyond what is allowed.
+    pub(crate) fn setting(what: &str, value: f64, allowed: &str) -> Self {
+        Self::Refused(format!("{what} is {value}: it has to be {allowed}"))
+    }
+
     /// A video is not that of the turn, with the difference.
     pub(crate) fn other_video(path: &Path, why: &str) -> Self {
         let path = path.display();
@@ -124,12 +79,6 @@ impl TurnError {
     pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |source| FolderFault::Write(path, source).into()
-    }
-}
-
-impl From<CapturedObjectError> for TurnError {
-    fn from(error: CapturedObjectError) -> Self {
-        Self::Asset(Box::new(error))
     }
 }
 

@@ -44,7 +44,7 @@ fn a_file_says_itself_whether_it_is_linear() {
     assert!((value(1.0, Some(Transfer::Gamma22)).unwrap() - 0.2176).abs() < 1e-3);
     assert!((value(1.0 / 1.8, None).unwrap() - 0.2872).abs() < 1e-3);
     let fault = value(1e-4, None).unwrap_err();
-    assert!(matches!(fault, DecomposeError::Colour { .. }), "{fault}");
+    assert!(fault.to_string().contains("--transfer"), "{fault}");
 
     let exr = folder.save("photo.exr", |path| {
         // Less than half of it is brighter than white.

@@ -33,7 +33,7 @@ fn an_object_without_light_is_not_decomposed() {
             &photo.mask,
             &photo.options(&DecomposeOptions::default()),
         );
-        assert!(matches!(found, Err(DecomposeError::Unlit)));
+        assert!(found.unwrap_err().to_string().contains("is black"));
         let found = load(&path, &PhotoReading::default());
         assert!(matches!(found, Err(DecomposeError::Black { .. })));
     }
@@ -110,13 +110,10 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
         PhotoInput::find(&paths, None).map(|found| found.inputs.len())
     };
     let empty = find(&[&masks]).unwrap_err();
-    assert!(
-        matches!(&empty, DecomposeError::File { path, .. } if *path == masks),
-        "{empty}"
-    );
+    assert!(is_named(&empty.to_string(), &["masks"]), "{empty}");
     for second in ["grey.jpg", "GREY.png", "Grey.jpg"] {
         let twice = find(&[&grey, &masks.join(second)]).unwrap_err();
-        assert!(matches!(twice, DecomposeError::Names(_)), "{twice}");
+        assert!(is_named(&twice.to_string(), &[second]), "{twice}");
     }
 }
 
@@ -128,7 +125,7 @@ fn a_result_never_has_the_place_of_another_photographs_where_case_is_ignored() {
     }
     for name in ["out/mug", "out/MUG", "out/Mug. ", "out/CAFE\u{301}"] {
         let fault = PhotoInput::check_result(&folder.path(name)).unwrap_err();
-        assert!(matches!(fault, DecomposeError::Names(_)), "{fault}");
+        assert!(is_named(&fault.to_string(), &[name]), "{fault}");
     }
     for name in ["out/Mug", "out/mug2", "none/mug"] {
         PhotoInput::check_result(&folder.path(name)).unwrap();

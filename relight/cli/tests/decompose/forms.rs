@@ -6,8 +6,6 @@ use std::path::PathBuf;
 
 use exr::prelude::WritableImage;
 use image::{DynamicImage, ImageFormat};
-use relight_core::image::ImageError;
-use relight_photo::decompose::DecomposeError;
 use relight_photo::files::{PhotoInput, PhotoList};
 
 use crate::support::{Folder, HEIGHT, WIDTH, is_inside, load, mask, object, with_mask};
@@ -35,7 +33,7 @@ fn a_jpeg_without_its_end_marker_is_the_same_photograph() {
     let cut = save("cut.jpg", &bare[..bare.len() - 40]);
     let fault = load(&cut, &mask).map(|photo| photo.name).unwrap_err();
     assert!(
-        matches!(&fault, DecomposeError::Image(ImageError::Form { path, .. }) if *path == cut),
+        fault.to_string().starts_with(cut.to_str().unwrap()),
         "{fault}"
     );
 }

@@ -18,7 +18,6 @@
 //! Readers ignore entries and fields that they do not know. A change that an older reader would misunderstand raises
 //! the number in the schema.
 
-mod error;
 mod manifest;
 mod object;
 mod read;
@@ -27,6 +26,5 @@ mod write;
 #[cfg(test)]
 mod tests;
 
-pub use error::CapturedObjectError;
 pub use manifest::CAPTURED_OBJECT_SCHEMA;
 pub use object::CapturedObject;

@@ -1,8 +1,7 @@
 //! The captured object in memory.
 
-use super::CapturedObjectError;
 use super::manifest::check_size;
-use crate::image::{Extent, Planes, check_extent};
+use crate::image::{Extent, ImageError, Planes, check_extent};
 use crate::render::Surface;
 
 /// An object that can be lit.
@@ -46,7 +45,7 @@ impl CapturedObject {
         surface: Surface,
         alpha: Planes<1>,
         confidence: Planes<1>,
-    ) -> Result<Self, CapturedObjectError> {
+    ) -> Result<Self, ImageError> {
         let extent = surface.extent();
         check_size(extent)?;
         for (what, map) in [

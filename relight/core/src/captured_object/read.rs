@@ -6,9 +6,11 @@ use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use super::manifest::{CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest, check_size};
-use super::{CapturedObject, CapturedObjectError};
-use crate::image::{Extent, Planes, Rgb};
+use super::CapturedObject;
+use super::manifest::{
+    CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest, check_size, damaged, no_archive,
+};
+use crate::image::{Extent, ImageError, Planes, Rgb};
 use crate::light::{Normals, YUp};
 use crate::render::{Gloss, Surface};
 
@@ -27,15 +29,15 @@ impl CapturedObject {
     ///
     /// # Errors
     /// If it is not a captured object that this version can read.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, CapturedObjectError> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, ImageError> {
         let length = bytes.len() as u64;
         if length > Self::MAX_BYTES {
-            return Err(CapturedObjectError::Content(format!(
+            return Err(ImageError::Other(format!(
                 "it has {length} bytes; the limit is {}",
                 Self::MAX_BYTES
             )));
         }
-        let mut archive = ZipArchive::new(Cursor::new(bytes))?;
+        let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(no_archive)?;
         let manifest = manifest(&mut archive)?;
         let extent = Extent::new(manifest.width, manifest.height);
         check_size(extent)?;
@@ -51,17 +53,16 @@ impl CapturedObject {
     }
 }
 
-fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, CapturedObjectError> {
+fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, ImageError> {
     let json = entry(archive, MANIFEST, MAX_MANIFEST)?;
-    let schema: Schema =
-        serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))?;
+    let schema: Schema = serde_json::from_slice(&json).map_err(damaged(MANIFEST))?;
     if schema.schema != CAPTURED_OBJECT_SCHEMA {
         let found: String = schema.schema.chars().take(80).collect();
-        return Err(CapturedObjectError::Content(format!(
+        return Err(ImageError::Other(format!(
             "its schema is {found:?}, this version reads {CAPTURED_OBJECT_SCHEMA:?}: use a newer relight"
         )));
     }
-    serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))
+    serde_json::from_slice(&json).map_err(damaged(MANIFEST))
 }
 
 /// The one field of `asset.json` that every version has.
@@ -71,12 +72,8 @@ struct Schema {
 }
 
 /// The bytes of an entry, up to a limit.
-fn entry(
-    archive: &mut Archive<'_>,
-    name: &'static str,
-    most: u64,
-) -> Result<Vec<u8>, CapturedObjectError> {
-    let wrong = CapturedObjectError::entry::<String>(name);
+fn entry(archive: &mut Archive<'_>, name: &'static str, most: u64) -> Result<Vec<u8>, ImageError> {
+    let wrong = damaged::<String>(name);
     let entry = archive
         .by_name(name)
         .map_err(|source| wrong(source.to_string()))?;
@@ -99,16 +96,16 @@ struct Maps<'a> {
 }
 
 impl Maps<'_> {
-    fn normals(&mut self) -> Result<Normals<YUp>, CapturedObjectError> {
+    fn normals(&mut self) -> Result<Normals<YUp>, ImageError> {
         Ok(Normals::from_colours(self.colours("normal.png", 1.0)?))
     }
 
-    fn albedo(&mut self) -> Result<Planes<3>, CapturedObjectError> {
+    fn albedo(&mut self) -> Result<Planes<3>, ImageError> {
         let white = self.white("albedo")?;
         self.colours("albedo.png", white)
     }
 
-    fn gloss(&mut self) -> Result<Option<Gloss>, CapturedObjectError> {
+    fn gloss(&mut self) -> Result<Option<Gloss>, ImageError> {
         if let Err(ZipError::FileNotFound) = self.archive.by_name("specular.png") {
             return Ok(None);
         }
@@ -120,20 +117,16 @@ impl Maps<'_> {
     }
 
     /// The value that the largest number of a map stands for.
-    fn white(&self, map: &'static str) -> Result<f32, CapturedObjectError> {
+    fn white(&self, map: &'static str) -> Result<f32, ImageError> {
         let white = self.manifest.white.get(map).copied().unwrap_or(f32::NAN);
         if white.is_finite() && white >= 0.0 {
             return Ok(white);
         }
         let reason = format!("white.{map} is not a number from 0 up");
-        Err(CapturedObjectError::entry(MANIFEST)(reason))
+        Err(damaged(MANIFEST)(reason))
     }
 
-    fn colours(
-        &mut self,
-        name: &'static str,
-        white: f32,
-    ) -> Result<Planes<3>, CapturedObjectError> {
+    fn colours(&mut self, name: &'static str, white: f32) -> Result<Planes<3>, ImageError> {
         let image = self.image(name)?.into_rgb16();
         let channel = |channel: usize| -> Vec<f32> {
             let pixels = image.as_raw().chunks_exact(3);
@@ -142,16 +135,16 @@ impl Maps<'_> {
         Ok(Planes::from_planes(self.extent, [0, 1, 2].map(channel))?)
     }
 
-    fn grey(&mut self, name: &'static str, white: f32) -> Result<Planes<1>, CapturedObjectError> {
+    fn grey(&mut self, name: &'static str, white: f32) -> Result<Planes<1>, ImageError> {
         let image = self.image(name)?.into_luma16();
         let values = image.as_raw().iter().map(|&raw| value(raw, white));
         Ok(Planes::from_planes(self.extent, [values.collect()])?)
     }
 
-    fn image(&mut self, name: &'static str) -> Result<DynamicImage, CapturedObjectError> {
+    fn image(&mut self, name: &'static str) -> Result<DynamicImage, ImageError> {
         let pixels = self.extent.pixels() as u64;
         let content = entry(&mut self.archive, name, BYTES_A_PIXEL * pixels + DECODER)?;
-        let wrong = CapturedObjectError::entry(name);
+        let wrong = damaged(name);
         let mut limits = Limits::default();
         limits.max_image_width = u32::try_from(self.extent.width).ok();
         limits.max_image_height = u32::try_from(self.extent.height).ok();
@@ -162,7 +155,7 @@ impl Maps<'_> {
         let found = Extent::new(image.width() as usize, image.height() as usize);
         if found != self.extent {
             let reason = format!("{} x {} pixels", found.width, found.height);
-            return Err(CapturedObjectError::entry(name)(reason));
+            return Err(damaged(name)(reason));
         }
         Ok(image)
     }

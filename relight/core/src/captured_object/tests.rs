@@ -140,9 +140,5 @@ fn maps_of_other_sizes_make_no_object() {
         object.confidence().clone(),
     );
     let refused = refused.unwrap_err();
-    assert!(
-        matches!(refused, CapturedObjectError::Image(_)),
-        "{refused:?}"
-    );
     assert!(refused.to_string().contains("coverage"), "{refused}");
 }

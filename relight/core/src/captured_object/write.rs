@@ -8,9 +8,9 @@ use image::{ExtendedColorType, ImageEncoder};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::manifest::{CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest};
-use super::{CapturedObject, CapturedObjectError};
-use crate::image::Planes;
+use super::CapturedObject;
+use super::manifest::{CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest, damaged, no_archive};
+use crate::image::{ImageError, Planes};
 
 type Archive = ZipWriter<Cursor<Vec<u8>>>;
 
@@ -19,7 +19,7 @@ impl CapturedObject {
     ///
     /// # Errors
     /// If a map cannot be encoded.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, CapturedObjectError> {
+    pub fn to_bytes(&self) -> Result<Vec<u8>, ImageError> {
         let surface = self.surface();
         let mut white = BTreeMap::new();
         let mut maps: Vec<(&'static str, Vec<u8>)> = Vec::new();
@@ -51,27 +51,20 @@ impl CapturedObject {
             height: self.extent().height,
             white,
         };
-        let json =
-            serde_json::to_vec_pretty(&manifest).map_err(CapturedObjectError::entry(MANIFEST))?;
+        let json = serde_json::to_vec_pretty(&manifest).map_err(damaged(MANIFEST))?;
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         add(&mut archive, MANIFEST, &json)?;
         for (name, content) in &maps {
             add(&mut archive, name, content)?;
         }
-        Ok(archive.finish()?.into_inner())
+        Ok(archive.finish().map_err(no_archive)?.into_inner())
     }
 }
 
-fn add(
-    archive: &mut Archive,
-    name: &'static str,
-    content: &[u8],
-) -> Result<(), CapturedObjectError> {
+fn add(archive: &mut Archive, name: &'static str, content: &[u8]) -> Result<(), ImageError> {
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    archive.start_file(name, options)?;
-    archive
-        .write_all(content)
-        .map_err(CapturedObjectError::entry(name))
+    archive.start_file(name, options).map_err(no_archive)?;
+    archive.write_all(content).map_err(damaged(name))
 }
 
 /// The largest finite value; 1 where all are 0.
@@ -86,7 +79,7 @@ fn png<const C: usize>(
     name: &'static str,
     planes: &Planes<C>,
     white: f32,
-) -> Result<Vec<u8>, CapturedObjectError> {
+) -> Result<Vec<u8>, ImageError> {
     let colour = if C == 1 {
         ExtendedColorType::L16
     } else {
@@ -103,6 +96,6 @@ fn png<const C: usize>(
     let mut content = Vec::new();
     PngEncoder::new_with_quality(&mut content, CompressionType::Fast, FilterType::Adaptive)
         .write_image(&raw, width, height, colour)
-        .map_err(CapturedObjectError::entry(name))?;
+        .map_err(damaged(name))?;
     Ok(content)
 }

@@ -135,15 +135,14 @@ impl StoredImage {
     /// The mask that the picture shows, 1 on the object and 0 elsewhere, and a note on it for a person. Errors name it as `path`.
     ///
     /// # Errors
-    /// [`ImageError::NotAMask`].
+    /// If it shows none.
     pub fn object_mask(&self, path: &Path) -> Result<(Planes<1>, Option<String>), ImageError> {
         let extent = self.planes.extent();
         let alpha = self.alpha.as_ref().map(|alpha| alpha.plane(0));
         let picture = MaskPicture::from_planes(extent.sides().into(), self.planes.planes(), alpha);
-        let object = picture.object().map_err(|fault| ImageError::NotAMask {
-            path: path.to_owned(),
-            fault,
-        })?;
+        let object = picture
+            .object()
+            .map_err(|fault| ImageError::Other(format!("the mask {} {fault}", path.display())))?;
         let values = object
             .inside
             .iter()

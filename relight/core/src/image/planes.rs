@@ -42,7 +42,7 @@ impl<const C: usize> Planes<C> {
     pub fn from_planes(extent: Extent, planes: [Vec<f32>; C]) -> Result<Self, ImageError> {
         match planes.iter().find(|plane| plane.len() != extent.pixels()) {
             None => Ok(Self { extent, planes }),
-            Some(plane) => Err(ImageError::Size(format!(
+            Some(plane) => Err(ImageError::Other(format!(
                 "a plane of {} values was given for {} x {} pixels",
                 plane.len(),
                 extent.width,

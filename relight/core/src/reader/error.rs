@@ -5,13 +5,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use relit_data::causes::with_causes;
+use relit_data::shard::ShardError;
 
 use crate::image::ImageError;
 use crate::parallel::JobPanic;
 
-/// Why a data set cannot be opened.
+/// Why a data set cannot be opened, or a sample not be given.
 #[derive(Debug, thiserror::Error)]
-pub enum OpenError {
+pub enum ReadError {
     /// The operating system refused.
     #[error("{} cannot be read", path.display())]
     Read {
@@ -20,78 +21,55 @@ pub enum OpenError {
         /// The operating system's reason.
         source: io::Error,
     },
-    /// A shard or the description of a data set cannot be used.
-    #[error("{} cannot be used", path.display())]
-    Dataset {
-        /// The file or folder.
-        path: PathBuf,
-        /// The fault.
-        source: relit_data::shard::ShardError,
-    },
-    /// It contains no samples, or its files do not belong together.
-    #[error("{} {fault}", path.display())]
-    Content {
-        /// The file or folder.
-        path: PathBuf,
-        /// The fault, and what is expected.
-        fault: String,
-    },
-    /// A thread cannot be started.
-    #[error("a thread for decoding cannot be started")]
-    Thread(#[source] io::Error),
-}
-
-impl OpenError {
-    /// A folder contains none of what is `expected`.
-    pub(super) fn empty(path: &Path, expected: &str) -> Self {
-        Self::Content {
-            path: path.to_owned(),
-            fault: format!("holds no samples: expected {expected}"),
-        }
-    }
-}
-
-/// Why a sample cannot be given.
-#[derive(Debug, thiserror::Error)]
-pub enum SampleFault {
-    /// The operating system refused.
-    #[error("{} cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: io::Error,
-    },
-    /// The shard is damaged there, or the image does not decode.
+    /// A shard is damaged, or an image in it does not decode.
     #[error(transparent)]
-    Shard(#[from] relit_data::shard::ShardError),
+    Shard(#[from] ShardError),
     /// Reading it panicked.
     #[error(transparent)]
     Panic(#[from] JobPanic),
     /// An image does not decode, or has another size than those that it belongs to.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// A part is missing, lost or of no use.
+    /// Any other fault, as a sentence.
     #[error("{0}")]
-    Part(String),
+    Other(String),
 }
 
-impl SampleFault {
+impl ReadError {
     /// Puts the path to an operating system's reason.
-    pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    pub(super) fn read(path: &Path) -> impl Fn(io::Error) -> Self {
         let path = path.to_owned();
-        |source| Self::Read { path, source }
+        move |source| Self::Read {
+            path: path.clone(),
+            source,
+        }
+    }
+
+    /// Puts the path to a fault, and to what is expected.
+    pub(super) fn file(path: &Path, fault: impl Display) -> Self {
+        Self::Other(format!("{} {fault}", path.display()))
+    }
+
+    /// Puts the path to the fault of a shard or of the description of a data set.
+    pub(super) fn dataset(path: &Path) -> impl FnOnce(ShardError) -> Self {
+        let path = path.to_owned();
+        move |fault| Self::file(&path, format!("cannot be used: {}", with_causes(&fault)))
+    }
+
+    /// A folder contains none of what is `expected`.
+    pub(super) fn empty(path: &Path, expected: &str) -> Self {
+        Self::file(path, format!("holds no samples: expected {expected}"))
     }
 
     /// Puts the path to what is wrong with numbers in a file.
     pub(super) fn numbers<E: Display>(path: &Path) -> impl FnOnce(E) -> Self {
         let path = path.to_owned();
-        move |fault| Self::Part(format!("{} does not parse: {fault}", path.display()))
+        move |fault| Self::file(&path, format!("does not parse: {fault}"))
     }
 
     /// That the sample lacks a part, a suffix or a file's name.
     pub fn missing(part: &str) -> Self {
-        Self::Part(format!("its {part} is missing"))
+        Self::Other(format!("its {part} is missing"))
     }
 }
 
@@ -103,7 +81,7 @@ pub struct DamagedSample {
     pub sample: String,
     /// Why.
     #[source]
-    pub fault: SampleFault,
+    pub fault: ReadError,
 }
 
 /// A batch with damaged samples. Its intact samples are included: a caller that accepts the loss

@@ -18,7 +18,7 @@ mod truth;
 mod turns;
 
 pub use draw_plan::{Cursor, Draw, DrawPlan, Rank, SampleId};
-pub use error::{DamagedBatch, DamagedSample, OpenError, SampleFault};
+pub use error::{DamagedBatch, DamagedSample, ReadError};
 pub use stream::{Source, Stream, StreamedBatch, Streaming};
 pub use truth::{TruthLayout, TruthSample, TruthSet};
 pub use turns::{Encoding, TurnBatch, TurnFrame, Turns};

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use super::draw_plan::Job;
-use super::{Cursor, DamagedBatch, DamagedSample, DrawPlan, OpenError, SampleId};
+use super::{Cursor, DamagedBatch, DamagedSample, DrawPlan, ReadError, SampleId};
 
 /// A set of samples that batches can be drawn from.
 pub trait Source: Send + Sync + 'static {
@@ -80,7 +80,7 @@ pub struct StreamedBatch<B> {
 ///     let (_images, _checkpoint) = (&drawn.batch.images, drawn.next);
 ///     stream.recycle(drawn.batch);
 /// }
-/// # Ok::<(), relight_core::reader::OpenError>(())
+/// # Ok::<(), relight_core::reader::ReadError>(())
 /// ```
 pub struct Stream<S: Source> {
     /// One queue a thread: thread `i` of `n` makes batches `i`, `i + n`, `i + 2 n`, ...
@@ -100,8 +100,8 @@ impl<S: Source> Stream<S> {
     /// Starts the threads.
     ///
     /// # Errors
-    /// [`OpenError::Thread`].
-    pub fn start(source: &Arc<S>, streaming: Streaming) -> Result<Self, OpenError> {
+    /// If a thread cannot be started.
+    pub fn start(source: &Arc<S>, streaming: Streaming) -> Result<Self, ReadError> {
         let count = streaming.threads.get();
         let mut stream = Self {
             queues: Vec::with_capacity(count),
@@ -116,7 +116,9 @@ impl<S: Source> Stream<S> {
             let thread = thread::Builder::new()
                 .name(format!("decode-{index}"))
                 .spawn(work)
-                .map_err(OpenError::Thread)?;
+                .map_err(|reason| {
+                    ReadError::Other(format!("a thread for decoding cannot be started: {reason}"))
+                })?;
             stream.queues.push(receiver);
             stream.threads.push(thread);
         }
@@ -203,7 +205,7 @@ fn decode<S: Source>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reader::{Draw, Rank, SampleFault};
+    use crate::reader::{Draw, Rank, ReadError};
 
     /// Turns whose samples are their own numbers; one of them is damaged.
     struct Numbers;
@@ -227,7 +229,7 @@ mod tests {
             let (bad, good): (Vec<_>, Vec<_>) = samples.iter().partition(|&&id| id == broken);
             let damage = |_| DamagedSample {
                 sample: "seven".to_owned(),
-                fault: SampleFault::Part("it is gone".to_owned()),
+                fault: ReadError::Other("it is gone".to_owned()),
             };
             (good, bad.into_iter().map(damage).collect())
         }

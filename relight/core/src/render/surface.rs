@@ -123,7 +123,6 @@ mod tests {
         let normals = || Normals::new(Planes::zeros(small));
         let albedo = |extent| Rgb::new(Planes::zeros(extent));
         let error = Surface::new(normals(), albedo(large), None).unwrap_err();
-        assert!(matches!(error, ImageError::Size(_)), "{error:?}");
         for named in ["albedo", "3 x 2", "2 x 2"] {
             assert!(error.to_string().contains(named), "{named}: {error}");
         }

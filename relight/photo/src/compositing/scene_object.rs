@@ -40,7 +40,7 @@ impl<'a> SceneObject<'a> {
 
     /// Refuses an object that does not fit into a picture of this size.
     pub(crate) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
-        let wrong = |fault| InsertError::Object { number, fault };
+        let wrong = |fault| InsertError::Input(format!("object {number} {fault}"));
         let Placement { at, height, .. } = self.placement;
         let alpha = &self.relightable.matte.alpha;
         if !self.placement.is_seen(alpha, extent) {

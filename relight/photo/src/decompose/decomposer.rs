@@ -277,7 +277,8 @@ impl CutObject {
         let mask = window.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
         let picture = cut_out(window.cut(picture.planes()).map(usable), &mask);
         if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
-            return Err(DecomposeError::Unlit);
+            let fault = "the object is black: give a brighter photograph, or another mask";
+            return Err(DecomposeError::Photo(fault.to_owned()));
         }
         Ok(Self {
             region,

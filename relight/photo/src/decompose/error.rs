@@ -1,6 +1,8 @@
 //! Why a photograph cannot be decomposed.
 
 #[cfg(feature = "files")]
+use std::fmt::Display;
+#[cfg(feature = "files")]
 use std::io;
 #[cfg(feature = "files")]
 use std::path::Path;
@@ -12,10 +14,7 @@ use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
 use relight_core::light::LightError;
 #[cfg(feature = "files")]
-use relight_core::reader::{DamagedSample, OpenError};
-use relit_data::geometry::Rect;
-use relit_data::still::ColourError;
-use relit_grabcut::MaskError;
+use relight_core::reader::{DamagedSample, ReadError};
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -26,15 +25,12 @@ pub enum DecomposeError {
     /// An image cannot be read or written.
     #[error(transparent)]
     Image(ImageError),
-    /// A photograph is too large, or a mask or rectangle does not fit it.
+    /// Any other fault, as a sentence.
     #[error("{0}")]
     Photo(String),
     /// There is nothing under the mask.
     #[error("the mask is empty: no pixel is at least one half")]
     EmptyMask,
-    /// The object is black.
-    #[error("the object is black: give a brighter photograph, or another mask")]
-    Unlit,
     /// A photograph without light.
     #[error("{} is completely black: give a brighter photograph", path.display())]
     Black {
@@ -51,29 +47,10 @@ pub enum DecomposeError {
         /// The photograph.
         path: PathBuf,
     },
-    /// No object can be cut out within a rectangle.
-    #[error("no object can be cut out within the rectangle {rectangle}")]
-    Rectangle {
-        /// The rectangle.
-        rectangle: Rect,
-        /// Why.
-        source: MaskError,
-    },
-    /// A file states colours that cannot be converted.
-    #[error("{} {fault}: convert it to sRGB or EXR, or give its encoding with --transfer", path.display())]
-    Colour {
-        /// The photograph.
-        path: PathBuf,
-        /// What it says.
-        fault: ColourError,
-    },
-    /// Two results would have one name, at least where a file system ignores case.
-    #[error("{0}")]
-    Names(String),
     /// A data set cannot be opened.
     #[cfg(feature = "files")]
     #[error(transparent)]
-    Open(#[from] OpenError),
+    Open(#[from] ReadError),
     /// A sample of a shard is damaged.
     #[cfg(feature = "files")]
     #[error("a sample is damaged")]
@@ -81,23 +58,12 @@ pub enum DecomposeError {
     /// No light can be fitted.
     #[error("no light can be fitted")]
     Light(#[from] LightError),
-    /// A file or folder is missing, or cannot be used for its purpose.
-    #[error("{} {fault}", path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// The fault.
-        fault: String,
-    },
 }
 
 #[cfg(feature = "files")]
 impl DecomposeError {
-    pub(crate) fn file(path: &Path, fault: impl Into<String>) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            fault: fault.into(),
-        }
+    pub(crate) fn file(path: &Path, fault: impl Display) -> Self {
+        Self::Photo(format!("{} {fault}", path.display()))
     }
 
     /// Puts the path to an operating system's reason.
@@ -137,7 +103,10 @@ impl From<FolderFault> for DecomposeError {
 impl From<ImageError> for DecomposeError {
     fn from(fault: ImageError) -> Self {
         match fault {
-            ImageError::Colour { path, fault } => Self::Colour { path, fault },
+            ImageError::Colour { path, fault } => Self::Photo(format!(
+                "{} {fault}: convert it to sRGB or EXR, or give its encoding with --transfer",
+                path.display()
+            )),
             fault => Self::Image(fault),
         }
     }

@@ -9,6 +9,7 @@ use super::usable_image::UsableImage;
 use relight_core::image::{
     ColourImage, ColourSpace, Extent, Linear, Planes, Rgb, Srgb, StoredImage, Transfer,
 };
+use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
 use relit_data::image_stats::SATURATED_VALUE;
 
@@ -95,7 +96,12 @@ impl Photo {
                 (Some(alpha), rectangle) => (mask_of_alpha(alpha, rectangle), MaskSource::Alpha),
                 (None, Some(rectangle)) => {
                     let (mask, warnings) = cut_out_within(image.to_srgb().planes(), rectangle)
-                        .map_err(|source| DecomposeError::Rectangle { rectangle, source })?;
+                        .map_err(|fault| {
+                            DecomposeError::Photo(format!(
+                                "no object can be cut out within the rectangle {rectangle}: {}",
+                                with_causes(&fault)
+                            ))
+                        })?;
                     notes.extend(warnings);
                     (mask, MaskSource::Rectangle)
                 }

@@ -12,12 +12,12 @@ use std::path::Path;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{Depth, Extent, Planes, Rgb, Srgb, encode_png};
+use relight_core::image::{Depth, Extent, ImageError, Planes, Rgb, Srgb, encode_png};
 use relight_core::render::Gloss;
 use serde_json::{Value, json};
 
-use super::ExportError;
 use super::mesh::{ObjectMesh, bled};
+use super::not_encoded;
 
 /// "glTF", the version, and the kinds of the two chunks.
 const MAGIC: u32 = 0x4654_6c67;
@@ -38,7 +38,7 @@ const BLEED: usize = 4;
 ///
 /// # Errors
 /// If a map cannot be encoded, or the file would be too large.
-pub fn to_glb(object: &CapturedObject, mesh: &ObjectMesh) -> Result<Vec<u8>, ExportError> {
+pub fn to_glb(object: &CapturedObject, mesh: &ObjectMesh) -> Result<Vec<u8>, ImageError> {
     let mut parts = Parts::default();
     let positions = &mesh.positions;
     let position = parts.floats(positions, Some(bounds(positions)));
@@ -98,11 +98,11 @@ pub fn to_glb(object: &CapturedObject, mesh: &ObjectMesh) -> Result<Vec<u8>, Exp
 }
 
 /// Header and chunks, each padded to four bytes.
-fn packed(mut json: Vec<u8>, mut binary: Vec<u8>) -> Result<Vec<u8>, ExportError> {
+fn packed(mut json: Vec<u8>, mut binary: Vec<u8>) -> Result<Vec<u8>, ImageError> {
     json.resize(json.len().next_multiple_of(4), b' ');
     binary.resize(binary.len().next_multiple_of(4), 0);
     let length = 12 + 8 + json.len() + 8 + binary.len();
-    let too_large = |_| ExportError::Encode(format!("{length} bytes exceed the 4 GiB of a GLB"));
+    let too_large = |_| not_encoded(format!("{length} bytes exceed the 4 GiB of a GLB"));
     let whole = u32::try_from(length).map_err(too_large)?;
     let mut file = Vec::with_capacity(length);
     for word in [MAGIC, VERSION, whole, json.len() as u32, JSON] {
@@ -201,7 +201,7 @@ fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
 }
 
 /// Albedo, brought to 1 where it is brighter, with alpha.
-fn colours(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
+fn colours(object: &CapturedObject) -> Result<Vec<u8>, ImageError> {
     let alpha = object.alpha();
     let linear = bled(object.surface().albedo().planes().clone(), alpha, BLEED);
     let colours = Rgb::new(linear.map(|value| value.min(1.0))).encode::<Srgb>();
@@ -220,12 +220,12 @@ fn colours(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
             height as u32,
             ExtendedColorType::Rgba8,
         )
-        .map_err(|error| ExportError::Encode(error.to_string()))?;
+        .map_err(not_encoded)?;
     Ok(png)
 }
 
 /// Normals in glTF's frame, which is ours; towards the viewer outside the object.
-fn normal_map(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
+fn normal_map(object: &CapturedObject) -> Result<Vec<u8>, ImageError> {
     let normals = object.surface().normals();
     let all = vec![true; normals.extent().pixels()];
     let mut colours = normals.completed(&all).to_colours();
@@ -234,11 +234,11 @@ fn normal_map(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
             *value = value.clamp(0.0, 1.0);
         }
     }
-    Ok(encode_png(Path::new("normal.png"), &colours, Depth::Eight)?)
+    encode_png(Path::new("normal.png"), &colours, Depth::Eight)
 }
 
 /// The roughness of glTF, whose square is the width of its lobe, that is as wide as that of smoothness α.
-fn roughness(gloss: &Gloss) -> Result<Vec<u8>, ExportError> {
+fn roughness(gloss: &Gloss) -> Result<Vec<u8>, ImageError> {
     let map = gloss
         .smoothness()
         .clone()
@@ -247,15 +247,11 @@ fn roughness(gloss: &Gloss) -> Result<Vec<u8>, ExportError> {
     let [green] = map.into_planes();
     let none = vec![0.0; extent.pixels()];
     let planes = Planes::from_planes(extent, [none.clone(), green, none])?;
-    Ok(encode_png(
-        Path::new("roughness.png"),
-        &planes,
-        Depth::Eight,
-    )?)
+    encode_png(Path::new("roughness.png"), &planes, Depth::Eight)
 }
 
 /// The colour of the reflection over its largest value, and that value over what a dielectric reflects.
-fn specular(gloss: &Gloss) -> Result<(Vec<u8>, f32), ExportError> {
+fn specular(gloss: &Gloss) -> Result<(Vec<u8>, f32), ImageError> {
     let smoothness = gloss.smoothness().plane(0);
     let mut part = gloss.reflectance().clone();
     for plane in part.planes_mut() {

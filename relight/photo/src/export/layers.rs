@@ -9,11 +9,11 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
 };
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::Planes;
+use relight_core::image::{ImageError, Planes};
 use relight_core::light::{Normals, YUp};
 
-use super::ExportError;
 use super::heights::integrated;
+use super::not_encoded;
 
 /// The longest side at which heights are found, pixels: larger maps have them enlarged.
 const MAX_SIDE: usize = 512;
@@ -22,7 +22,7 @@ const MAX_SIDE: usize = 512;
 ///
 /// # Errors
 /// If it cannot be encoded.
-pub fn to_layers(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
+pub fn to_layers(object: &CapturedObject) -> Result<Vec<u8>, ImageError> {
     let surface = object.surface();
     let alpha = object.alpha().plane(0);
     let mut channels = Vec::new();
@@ -61,7 +61,7 @@ pub fn to_layers(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
 fn encode(
     object: &CapturedObject,
     channels: Vec<AnyChannel<FlatSamples>>,
-) -> Result<Vec<u8>, ExportError> {
+) -> Result<Vec<u8>, ImageError> {
     let extent = object.extent();
     let attributes = LayerAttributes {
         software_name: Some(concat!("relight ", env!("CARGO_PKG_VERSION")).into()),
@@ -77,7 +77,7 @@ fn encode(
     Image::from_layer(layer)
         .write()
         .to_buffered(&mut file)
-        .map_err(|error| ExportError::Encode(error.to_string()))?;
+        .map_err(not_encoded)?;
     Ok(file.into_inner())
 }
 

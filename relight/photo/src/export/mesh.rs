@@ -1,10 +1,9 @@
 //! A relief with the object's outline. Knows nothing of files.
 
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{Extent, Planes};
+use relight_core::image::{Extent, ImageError, Planes};
 use relight_core::light::{Normals, YUp};
 
-use super::ExportError;
 use super::heights::integrated;
 
 /// Triangles with the place of each corner on the picture.
@@ -22,10 +21,11 @@ impl ObjectMesh {
     /// The integrated normals of an object, with so many vertices on the longer side of the picture, at least 2.
     ///
     /// # Errors
-    /// [`ExportError::Empty`] if the object is nowhere.
-    pub fn from_object(object: &CapturedObject, vertices: usize) -> Result<Self, ExportError> {
+    /// If the object is nowhere.
+    pub fn from_object(object: &CapturedObject, vertices: usize) -> Result<Self, ImageError> {
         if object.alpha().plane(0).iter().all(|&alpha| alpha < 0.5) {
-            return Err(ExportError::Empty);
+            let fault = "the object covers no pixel by half or more: there is nothing to export";
+            return Err(ImageError::Other(fault.to_owned()));
         }
         Ok(grid_mesh(object, vertices.max(2)))
     }
@@ -182,6 +182,6 @@ mod tests {
         let none = Planes::zeros(whole.extent());
         let empty = CapturedObject::new("none", whole.surface().clone(), none.clone(), none);
         let error = ObjectMesh::from_object(&empty.unwrap(), 8).unwrap_err();
-        assert!(matches!(error, ExportError::Empty));
+        assert!(error.to_string().contains("covers no pixel"), "{error}");
     }
 }

@@ -10,15 +10,22 @@
 //!
 //! Axes are those of all of relight, which are glTF's too: x to the right, y up, z to the viewer.
 
-mod error;
 mod glb;
 mod heights;
 mod layers;
 mod mesh;
 mod source;
 
-pub use error::ExportError;
+use std::fmt::Display;
+
+use relight_core::image::ImageError;
+
 pub use glb::to_glb;
 pub use layers::to_layers;
 pub use mesh::ObjectMesh;
 pub use source::{is_object, read_object};
+
+/// That an object does not fit into a file.
+fn not_encoded(fault: impl Display) -> ImageError {
+    ImageError::Other(format!("the object cannot be encoded: {fault}"))
+}

@@ -5,12 +5,10 @@ use std::path::Path;
 
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::read_planes;
-use relight_core::image::{Planes, Rgb, Transfer};
+use relight_core::image::{ImageError, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, YUp};
 use relight_core::render::{Gloss, Surface};
 use serde::Deserialize;
-
-use super::ExportError;
 
 /// The figures of a decomposition, and those of a turn.
 const FIGURES: [&str; 2] = ["decomposition.json", "turn.json"];
@@ -52,29 +50,28 @@ fn figures_in(folder: &Path) -> Option<&'static str> {
 ///
 /// # Errors
 /// If it holds no object, or if a file cannot be read.
-pub fn read_object(path: &Path) -> Result<CapturedObject, ExportError> {
+pub fn read_object(path: &Path) -> Result<CapturedObject, ImageError> {
     if !path.exists() {
-        return Err(ExportError::Missing(path.to_owned()));
+        return Err(ImageError::file(
+            path,
+            "does not exist: give object.relit, or a folder that relight turn or relight decompose has written",
+        ));
     }
     if path.is_file() || path.join(CapturedObject::FILE).is_file() {
-        return Ok(CapturedObject::read(path)?);
+        return CapturedObject::read(path);
     }
     let Some(figures) = figures_in(path) else {
-        return Err(ExportError::Source {
-            path: path.to_owned(),
-            fault: "holds no object: give object.relit, or a folder that relight turn or relight decompose has written"
-                .to_owned(),
-        });
+        return Err(ImageError::file(
+            path,
+            "holds no object: give object.relit, or a folder that relight turn or relight decompose has written",
+        ));
     };
     read_maps(path, figures)
 }
 
-fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ExportError> {
+fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ImageError> {
     let file = folder.join(figures);
-    let wrong = |reason: String| ExportError::Source {
-        path: file.clone(),
-        fault: format!("cannot be read: {reason}"),
-    };
+    let wrong = |reason: String| ImageError::file(&file, format!("cannot be read: {reason}"));
     let json = fs::read(&file).map_err(|error| wrong(error.to_string()))?;
     let figures: MapFigures =
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
@@ -101,5 +98,5 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ExportError
         .file_name()
         .map_or_else(|| "object".to_owned(), |n| n.to_string_lossy().into_owned());
     let surface = Surface::new(normals, albedo, gloss)?;
-    Ok(CapturedObject::new(name, surface, alpha, confidence)?)
+    CapturedObject::new(name, surface, alpha, confidence)
 }

@@ -120,11 +120,11 @@ impl PhotoInput {
     /// are, also where a file system ignores case.
     ///
     /// # Errors
-    /// [`DecomposeError::Names`], or if the folder cannot be listed.
+    /// If it does not, or the folder cannot be listed.
     pub fn check_result(path: &Path) -> Result<(), DecomposeError> {
         match name_differing_in_case(path).map_err(DecomposeError::read(path))? {
             None => Ok(()),
-            Some(other) => Err(DecomposeError::Names(format!(
+            Some(other) => Err(DecomposeError::Photo(format!(
                 "{} would replace {} where a file system ignores case: rename the photograph, or give another folder with \
                  --output",
                 path.display(),
@@ -262,7 +262,7 @@ fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
         };
         let Some(name) = name else { continue };
         if let Some(first) = names.insert(folded(&name), path) {
-            return Err(DecomposeError::Names(format!(
+            return Err(DecomposeError::Photo(format!(
                 "{} and {} would both be written to {name} (case is ignored): rename one, or decompose them in two runs with \
                  different --output",
                 first.display(),

@@ -72,9 +72,7 @@ impl InsertSource {
                     path.display()
                 )));
             }
-            let object =
-                read_object(&path).map_err(|error| InsertError::Input(with_causes(&error)))?;
-            return Ok(Self::Captured(Box::new(object)));
+            return Ok(Self::Captured(Box::new(read_object(&path)?)));
         }
         let reading = PhotoReading {
             mask: object.mask.as_ref().map(|mask| folder.join(mask)),

@@ -13,7 +13,7 @@ mod results;
 pub use background::BackgroundFile;
 pub use input::{PhotoInput, PhotoList, PhotoReading, UnusedFile};
 pub use insertion::{InsertSource, Insertion, InsertionOutput};
-pub use movie::{FrameRate, MovieError, MovieFormat, MovieWriter};
+pub use movie::{FrameRate, MovieFormat, MovieWriter};
 pub use movie_reader::{FrameTiming, MovieReader};
 pub use output::{OutputKind, write_picture};
 pub use results::{DecompositionFigures, DecompositionFiles, bright, write_light};

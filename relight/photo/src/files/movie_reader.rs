@@ -5,11 +5,11 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use relight_core::image::{Extent, Planes, Rgb, Srgb};
+use relight_core::image::{Extent, ImageError, Planes, Rgb, Srgb};
 use relit_data::colour::{ColourFault, ToSrgb, YuvDecoding};
 use serde::Deserialize;
 
-use super::movie::{Ffmpeg, FrameRate, MovieError, SILENT, file_url};
+use super::movie::{Ffmpeg, FrameRate, SILENT, file_url, no_program};
 
 /// The most pixels of a video's frame.
 const MAX_PIXELS: usize = 1 << 26;
@@ -45,7 +45,7 @@ impl MovieReader {
     ///
     /// # Errors
     /// If a program cannot be started, the file is not a video, or its colours cannot be converted.
-    pub fn open(path: &Path, timing: FrameTiming) -> Result<Self, MovieError> {
+    pub fn open(path: &Path, timing: FrameTiming) -> Result<Self, ImageError> {
         let facts = Facts::probe(path)?;
         let frame_rate = facts
             .frame_rate()
@@ -53,7 +53,7 @@ impl MovieReader {
         let extent = displayed_extent(path)?;
         let wide = facts.wide_colour(extent.height);
         let wide = wide.map_err(|fault| {
-            MovieError::file(
+            ImageError::file(
                 path,
                 format!(
                     "cannot be read: {fault} cannot be converted to sRGB: convert the video to SDR with BT.709 colours first"
@@ -111,7 +111,7 @@ impl MovieReader {
     ///
     /// # Errors
     /// If the program fails, or the file ends in the middle of a frame.
-    pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, MovieError> {
+    pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, ImageError> {
         let Some(pipe) = &mut self.program.child.stdout else {
             return Ok(None);
         };
@@ -141,7 +141,7 @@ impl MovieReader {
         Ok(Some(Rgb::new(planes)))
     }
 
-    fn failure(&mut self) -> MovieError {
+    fn failure(&mut self) -> ImageError {
         drop(self.program.child.stdout.take());
         // What is not read any more cannot end by itself.
         let _ = self.program.child.kill();
@@ -185,12 +185,12 @@ fn ffmpeg(path: &Path) -> Command {
 }
 
 /// Width and height of a video as displayed, by the header of its first frame as a PPM.
-fn displayed_extent(path: &Path) -> Result<Extent, MovieError> {
+fn displayed_extent(path: &Path) -> Result<Extent, ImageError> {
     let output = ffmpeg(path)
         .args(["-frames:v", "1", "-vf", SQUARE_PIXELS])
         .args(["-f", "image2pipe", "-c:v", "ppm", "pipe:1"])
         .output();
-    let output = output.map_err(MovieError::NoProgram)?;
+    let output = output.map_err(no_program)?;
     let start = &output.stdout[..output.stdout.len().min(64)];
     let header = String::from_utf8_lossy(start);
     let mut numbers = header
@@ -206,12 +206,12 @@ fn displayed_extent(path: &Path) -> Result<Extent, MovieError> {
     }
 }
 
-fn no_video(path: &Path, said: &str) -> MovieError {
-    MovieError::file(path, format!("is not a readable video: {said}"))
+fn no_video(path: &Path, said: &str) -> ImageError {
+    ImageError::file(path, format!("is not a readable video: {said}"))
 }
 
 /// The same, by what a program wrote.
-fn unread(path: &Path, output: &Output) -> MovieError {
+fn unread(path: &Path, output: &Output) -> ImageError {
     let errors = String::from_utf8_lossy(&output.stderr);
     let last = errors.lines().last();
     no_video(
@@ -239,7 +239,7 @@ struct Stated {
 }
 
 impl Facts {
-    fn probe(path: &Path) -> Result<Self, MovieError> {
+    fn probe(path: &Path) -> Result<Self, ImageError> {
         const COLOURS: &str = "color_space,color_transfer,color_primaries";
         let entries = format!("stream=r_frame_rate,avg_frame_rate,{COLOURS}:frame={COLOURS}");
         let output = Command::new("ffprobe")
@@ -248,7 +248,7 @@ impl Facts {
             .arg(file_url(path))
             .stdin(Stdio::null())
             .output()
-            .map_err(MovieError::NoProgram)?;
+            .map_err(no_program)?;
         let facts: Option<Self> = serde_json::from_slice(&output.stdout).ok();
         facts
             .filter(|facts| !facts.streams.is_empty())

@@ -86,7 +86,7 @@ impl Weights {
         let overflows = |value: &f32| value.is_finite() && !half::f16::from_f32(*value).is_finite();
         for (name, tensor) in self.iter() {
             if let Some(&value) = tensor.values().iter().find(|value| overflows(value)) {
-                return Err(NetError::Weights(format!(
+                return Err(NetError::Other(format!(
                     "{name} holds {value}, beyond the 65504 of half precision: write it in single precision"
                 )));
             }

@@ -1,14 +1,12 @@
 //! Errors of weights and inference.
 
+use std::fmt::Display;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why weights could not be read, written or used.
 #[derive(Debug, thiserror::Error)]
 pub enum NetError {
-    /// Weights of another network, or that do not fit into it or a file.
-    #[error("{0}")]
-    Weights(String),
     /// A file that cannot be read or written.
     #[error("{path} could not be {doing}", path = .path.display())]
     Io {
@@ -19,23 +17,20 @@ pub enum NetError {
         /// The system's reason.
         source: io::Error,
     },
-    /// A file that holds no weights, no network or no library that can be used.
-    #[error("{path} cannot be used: {fault}", path = .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The fault.
-        fault: String,
-    },
-    /// A network that cannot be run, or cannot take such a picture.
+    /// Any other fault, as a sentence.
     #[error("{0}")]
-    Run(String),
+    Other(String),
 }
 
 impl NetError {
+    /// A file holds no weights that can be used.
+    pub fn file(path: &Path, fault: impl Display) -> Self {
+        Self::Other(format!("{} cannot be used: {fault}", path.display()))
+    }
+
     /// Weights lack a parameter.
     pub fn missing(net: &str, name: &str) -> Self {
-        Self::Weights(format!(
+        Self::Other(format!(
             "the weights have no {name}, which {net} needs: are they another network's?"
         ))
     }

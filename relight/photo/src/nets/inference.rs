@@ -34,7 +34,7 @@ impl Inference {
     /// Makes a network ready for pictures of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
+    /// If the network cannot take such pictures, or what [`Weights::fitted_to`] answers.
     pub fn new(
         graph: &Graph,
         weights: &Weights,
@@ -43,26 +43,28 @@ impl Inference {
         check_size(graph, (width, height))?;
         let onnx = to_onnx(graph, weights, WeightPrecision::Single, &[])?;
         let (name, shape) = (graph.name(), [1, graph.input_channels(), height, width]);
-        let plan = prepared(&onnx, shape)
-            .map_err(|fault| NetError::Run(format!("tract could not prepare {name}: {fault:#}")))?;
+        let plan = prepared(&onnx, shape).map_err(|fault| {
+            NetError::Other(format!("tract could not prepare {name}: {fault:#}"))
+        })?;
         Ok(Self { name, shape, plan })
     }
 
     /// Runs it on one picture: channel by channel, row by row. The outputs come in the graph's order.
     ///
     /// # Errors
-    /// [`NetError::Run`], also where the input is not as long as its shape.
+    /// If the input is not as long as its shape, or the network fails.
     pub fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, NetError> {
         let [_, channels, height, width] = self.shape;
         if input.len() != channels * height * width {
-            return Err(NetError::Run(format!(
+            return Err(NetError::Other(format!(
                 "{} takes {channels} channels of {width} x {height} pixels, not {} numbers",
                 self.name,
                 input.len()
             )));
         }
-        self.outputs(input)
-            .map_err(|fault| NetError::Run(format!("tract could not run {}: {fault:#}", self.name)))
+        self.outputs(input).map_err(|fault| {
+            NetError::Other(format!("tract could not run {}: {fault:#}", self.name))
+        })
     }
 
     fn outputs(&self, input: &[f32]) -> TractResult<Vec<Tensor>> {

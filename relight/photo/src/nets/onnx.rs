@@ -33,7 +33,7 @@ const INFERRED: i64 = -1;
 /// `facts` are the metadata of the file.
 ///
 /// # Errors
-/// What [`Weights::fitted_to`] answers, or [`NetError::Weights`] if half precision cannot hold a weight.
+/// What [`Weights::fitted_to`] answers, or if half precision cannot hold a weight.
 pub fn to_onnx(
     graph: &Graph,
     weights: &Weights,
@@ -87,7 +87,7 @@ pub fn to_onnx(
 /// Whether the network can take pictures of this size.
 ///
 /// # Errors
-/// [`NetError::Run`].
+/// If it cannot.
 pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), NetError> {
     let multiple = graph.multiple();
     let divides = width.is_multiple_of(multiple) && height.is_multiple_of(multiple);
@@ -98,7 +98,7 @@ pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), 
         }
         _ => return Ok(()),
     };
-    Err(NetError::Run(format!(
+    Err(NetError::Other(format!(
         "{} cannot take a picture of {width} x {height} pixels: {needs}",
         graph.name()
     )))

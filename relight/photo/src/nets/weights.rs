@@ -95,7 +95,7 @@ impl Weights {
     /// before every name of a network that ran on several devices.
     ///
     /// # Errors
-    /// [`NetError::Weights`], with the parameter's name.
+    /// If they do not, with the parameter's name.
     pub fn fitted_to(&self, graph: &Graph) -> Result<Self, NetError> {
         let all_wrapped = self.tensors.keys().all(|name| name.starts_with("module."));
         let mut given = if all_wrapped {
@@ -110,7 +110,7 @@ impl Weights {
                 .remove(&name)
                 .ok_or_else(|| NetError::missing(graph.name(), &name))?;
             if tensor.shape != parameter.shape {
-                return Err(NetError::Weights(format!(
+                return Err(NetError::Other(format!(
                     "{name} is of shape {:?} where {} needs {:?}: are they another network's weights?",
                     tensor.shape,
                     graph.name(),
@@ -118,14 +118,14 @@ impl Weights {
                 )));
             }
             if !tensor.values.iter().all(|value| value.is_finite()) {
-                return Err(NetError::Weights(format!(
+                return Err(NetError::Other(format!(
                     "{name} holds a value that is not a finite number: the training that made it failed"
                 )));
             }
             tensors.insert(name, tensor);
         }
         match given.into_keys().next() {
-            Some(name) => Err(NetError::Weights(format!(
+            Some(name) => Err(NetError::Other(format!(
                 "the weights hold {name}, which {} does not have: are they another network's?",
                 graph.name()
             ))),

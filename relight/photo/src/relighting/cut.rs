@@ -63,10 +63,11 @@ fn check_light(photo: &Rgb<Linear>) -> Result<(), InsertError> {
             .iter()
             .position(|value| !(value.is_finite() && *value >= 0.0));
         if let Some(at) = odd {
-            return Err(InsertError::NotLight {
-                x: at % width,
-                y: at / width,
-            });
+            return Err(InsertError::Input(format!(
+                "the photograph has a value that is negative, infinite or not a number at column {}, row {}",
+                at % width,
+                at / width
+            )));
         }
     }
     Ok(())

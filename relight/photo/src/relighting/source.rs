@@ -23,7 +23,7 @@ impl LightSource {
     /// The light as coefficients: all given ones, or enough for highlights.
     ///
     /// # Errors
-    /// [`InsertError::Dark`] if no surface receives any of it.
+    /// If no surface receives any of it.
     pub fn light(&self) -> Result<ShLight, InsertError> {
         let light = match self {
             Self::Panorama(panorama) => panorama.project(Order::HIGHLIGHT),
@@ -33,7 +33,8 @@ impl LightSource {
         // An exposure is 1 for light that reaches nothing.
         let is_dark = light.coefficients().iter().flatten().all(|&c| c == 0.0);
         if is_dark || brightest(&light) <= 0.0 {
-            return Err(InsertError::Dark);
+            let fault = "the light is completely dark: give another light";
+            return Err(InsertError::Input(fault.to_owned()));
         }
         Ok(light)
     }
@@ -159,7 +160,7 @@ mod tests {
     #[test]
     fn no_light_is_refused() {
         let dark = LightSource::Coefficients(ShLight::dark(Order::TWO));
-        assert!(matches!(dark.light(), Err(InsertError::Dark)));
+        assert!(dark.light().is_err());
         assert!(LightSource::Lamp(DiscLamp::default()).light().is_ok());
     }
 }

@@ -171,10 +171,7 @@ fn what_is_no_photograph_is_refused() {
     let mut odd = photo();
     odd.planes_mut().set_pixel(7, 5, [0.1, f32::NAN, 0.1]);
     let odd = refused(odd, mask());
-    assert!(
-        matches!(odd, InsertError::NotLight { x: 7, y: 5 }),
-        "{odd:?}"
-    );
+    assert!(odd.to_string().contains("column 7, row 5"), "{odd}");
     let empty = refused(photo(), Planes::zeros(EXTENT));
     assert!(
         matches!(empty, InsertError::Decompose(DecomposeError::EmptyMask)),
@@ -185,13 +182,6 @@ fn what_is_no_photograph_is_refused() {
     for size in ["70 x 90", "90 x 70"] {
         assert!(other.to_string().contains(size), "{other}");
     }
-    assert!(matches!(
-        LightSource::Coefficients(relight_core::light::ShLight::dark(
-            relight_core::light::Order::TWO
-        ))
-        .light(),
-        Err(InsertError::Dark)
-    ));
 }
 
 /// A captured ball of one colour.

@@ -116,7 +116,7 @@ impl Model {
     /// precision's [`ComputePrecision::kind`].
     ///
     /// # Errors
-    /// [`relight_photo::nets::NetError::Run`] or [`TrainError::Torch`].
+    /// [`relight_photo::nets::NetError`] or [`TrainError::Torch`].
     pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {

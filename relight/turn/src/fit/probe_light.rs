@@ -296,6 +296,6 @@ mod tests {
         };
         let picture = Rgb::<Srgb>::new(Planes::zeros(Extent::new(100, 100)));
         let refused = ProbeBuilder::new(beyond).push(0.0, &picture);
-        assert!(matches!(refused, Err(TurnError::Setting { .. })));
+        assert!(matches!(refused, Err(TurnError::Refused(_))));
     }
 }

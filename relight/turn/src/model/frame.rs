@@ -49,14 +49,14 @@ impl Elevation {
     /// An elevation that was measured, degrees.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] beyond 0 to 89 degrees.
+    /// If it is beyond 0 to 89 degrees.
     pub fn measured(degrees: f64) -> Result<Self, TurnError> {
         if !CAMERA_ELEVATIONS_DEG.contains(&degrees) {
-            return Err(TurnError::Setting {
-                what: "the elevation",
-                value: degrees,
-                allowed: "0 to 89 degrees",
-            });
+            return Err(TurnError::setting(
+                "the elevation",
+                degrees,
+                "0 to 89 degrees",
+            ));
         }
         Ok(Self {
             degrees,
@@ -68,7 +68,7 @@ impl Elevation {
     /// The elevation of the rig, as a session has it, degrees.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] beyond 0 to 89 degrees.
+    /// If it is beyond 0 to 89 degrees.
     pub fn from_rig(degrees: f64) -> Result<Self, TurnError> {
         Ok(Self {
             source: FactSource::Rig,

@@ -37,9 +37,14 @@ pub(crate) fn session_of<'a>(dataset: &'a Dataset, shard: &Path) -> Option<&'a S
 /// one around it, or in a folder of that.
 ///
 /// # Errors
-/// [`TurnError::NoSession`] if it is in none of them; that of opening what is there.
+/// If it is in none of them; that of opening what is there.
 pub(crate) fn recording_of(shard: &Path) -> Result<Recording, TurnError> {
-    let nothing = || TurnError::NoSession(shard.to_owned());
+    let nothing = || {
+        TurnError::Refused(format!(
+            "the session or video from which {} was made is not next to its data set: give it with --session",
+            shard.display()
+        ))
+    };
     let (dataset, folder) = dataset_of(shard).ok_or_else(nothing)?;
     let session = session_of(&dataset, shard).ok_or_else(nothing)?;
     let found = folders_near(&folder)
@@ -142,7 +147,7 @@ mod tests {
     fn a_video_of_another_length_or_elsewhere_is_not_that_of_the_shard() {
         let root = tempfile::tempdir().unwrap();
         let shard = shard_in(root.path());
-        let refused = || matches!(recording_of(&shard), Err(TurnError::NoSession(_)));
+        let refused = || matches!(recording_of(&shard), Err(TurnError::Refused(_)));
         assert!(refused());
         fs::write(root.path().join("clip.mkv"), b"another video").unwrap();
         assert!(refused());

@@ -54,15 +54,15 @@ impl ProbeBuilder {
     /// Takes up a frame at an angle of the table, degrees.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] if the ball is not in it.
+    /// If the ball is not in it.
     pub(crate) fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
         let (picture, place) = (frame.planes(), self.probe.place);
         if !place.is_within(picture.extent()) {
-            return Err(TurnError::Setting {
-                what: "the radius of the ball",
-                value: place.radius,
-                allowed: "so small that all of the ball is in the picture",
-            });
+            return Err(TurnError::setting(
+                "the radius of the ball",
+                place.radius,
+                "so small that all of the ball is in the picture",
+            ));
         }
         let builder = match &mut self.builder {
             Some(builder) => builder,

@@ -29,14 +29,14 @@ impl ProbePlace {
     /// A ball with its middle at `x`, `y`.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] if the radius is less than 4 pixels or a number is not finite.
+    /// If the radius is less than 4 pixels or a number is not finite.
     pub fn new([x, y]: [f64; 2], radius: f64) -> Result<Self, TurnError> {
         if !(x.is_finite() && y.is_finite() && radius.is_finite() && radius >= 4.0) {
-            return Err(TurnError::Setting {
-                what: "the radius of the ball",
-                value: radius,
-                allowed: "at least 4 pixels, and its middle a place in the picture",
-            });
+            return Err(TurnError::setting(
+                "the radius of the ball",
+                radius,
+                "at least 4 pixels, and its middle a place in the picture",
+            ));
         }
         Ok(Self {
             middle: [x, y],

@@ -90,10 +90,11 @@ pub fn read_curves(
     let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
     let names: Vec<&str> = turns.names().collect();
     let [name] = names.as_slice() else {
-        return Err(TurnError::ManyTurns {
-            path: path.to_owned(),
-            found: names.len(),
-        });
+        return Err(TurnError::Refused(format!(
+            "{} holds {} turns: give the shard (.tar) of one",
+            path.display(),
+            names.len()
+        )));
     };
     let frames = turns.turns().iter().sum::<u32>();
     let streaming = Streaming {
@@ -138,11 +139,11 @@ pub fn read_curves(
     let finished = reader.finish((*name).to_owned());
     finished.map_err(|error| match damage {
         // That frames are missing explains it better than how many are left.
-        Some(damage) => TurnError::Damaged {
-            path: path.to_owned(),
-            damage,
-            source: Box::new(error),
-        },
+        Some(damage) => TurnError::Refused(format!(
+            "{} is damaged ({damage}), and the rest of it cannot be solved: {}",
+            path.display(),
+            with_causes(&error)
+        )),
         None => error,
     })
 }

@@ -139,12 +139,12 @@ fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(
     if values.all(|value| value.is_finite() && *value >= 0.0) {
         return Ok(());
     }
-    Err(ImageError::Form {
-        path: path.to_owned(),
-        fault: format!(
+    Err(ImageError::file(
+        path,
+        format!(
             "is not a map of {what}: it has a value that is negative, infinite or not a number"
         ),
-    })
+    ))
 }
 
 /// One number, three numbers separated by commas, or else a file.

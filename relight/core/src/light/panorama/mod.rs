@@ -57,10 +57,7 @@ impl Panorama {
     /// If it is not an image, holds integers, is not twice as wide as high, or has values that are not finite.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
         let image = ColourImage::from_bytes(path, bytes, None)?;
-        let wrong = |fault| ImageError::Form {
-            path: path.to_owned(),
-            fault,
-        };
+        let wrong = |fault: String| ImageError::file(path, fault);
         if image.stored().samples == Samples::Integer {
             let fault =
                 "holds 8- or 16-bit integers: give a panorama in linear radiance, HDR or EXR";

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use crate::image::Transfer;
-use crate::reader::OpenError;
+use crate::reader::ReadError;
 use crate::reader::listing::listed;
 
 /// How a folder of images with their ground truth is laid out.
@@ -117,7 +117,7 @@ impl TruthLayout {
         }
     }
 
-    pub(super) fn entries(self, root: &Path) -> Result<Vec<Entry>, OpenError> {
+    pub(super) fn entries(self, root: &Path) -> Result<Vec<Entry>, ReadError> {
         match self {
             Self::Synth => folders(root, &SYNTH),
             Self::Mit => folders(root, &MIT),
@@ -143,7 +143,7 @@ impl FromStr for TruthLayout {
 }
 
 /// Samples that have a folder each, known by their mask.
-fn folders(root: &Path, known: &[(Role, &str, bool)]) -> Result<Vec<Entry>, OpenError> {
+fn folders(root: &Path, known: &[(Role, &str, bool)]) -> Result<Vec<Entry>, ReadError> {
     let samples = listed(root, |path| path.join("mask.png").is_file())?;
     Ok(samples
         .iter()
@@ -154,7 +154,7 @@ fn folders(root: &Path, known: &[(Role, &str, bool)]) -> Result<Vec<Entry>, Open
         .collect())
 }
 
-fn janner(root: &Path) -> Result<Vec<Entry>, OpenError> {
+fn janner(root: &Path) -> Result<Vec<Entry>, ReadError> {
     let mut entries = numbered(root, "")?;
     for category in listed(root, Path::is_dir)? {
         entries.extend(numbered(&category, &format!("{}/", name_of(&category)))?);
@@ -163,7 +163,7 @@ fn janner(root: &Path) -> Result<Vec<Entry>, OpenError> {
 }
 
 /// The numbered samples directly in a folder, in the order of their numbers.
-fn numbered(folder: &Path, prefix: &str) -> Result<Vec<Entry>, OpenError> {
+fn numbered(folder: &Path, prefix: &str) -> Result<Vec<Entry>, ReadError> {
     let number = |path: &PathBuf| -> Option<u64> {
         let name = path.file_name()?.to_str()?;
         name.strip_suffix("_mask.png")?.parse().ok()

@@ -5,7 +5,7 @@ mod read;
 
 use std::path::Path;
 
-use super::{DamagedSample, OpenError};
+use super::{DamagedSample, ReadError};
 use crate::image::{Extent, Linear, Planes, Rgb};
 use crate::light::{Normals, ShLight, YUp};
 use layout::Entry;
@@ -53,11 +53,11 @@ impl TruthSet {
     /// Finds the samples in the folder `root`, in the order of their names.
     ///
     /// # Errors
-    /// [`OpenError::Read`], or [`OpenError::Content`] if it contains no samples.
-    pub fn open(root: &Path, layout: TruthLayout) -> Result<Self, OpenError> {
+    /// If it cannot be read, or contains no samples.
+    pub fn open(root: &Path, layout: TruthLayout) -> Result<Self, ReadError> {
         let entries = layout.entries(root)?;
         if entries.is_empty() {
-            return Err(OpenError::empty(root, layout.expected()));
+            return Err(ReadError::empty(root, layout.expected()));
         }
         Ok(Self { layout, entries })
     }
@@ -90,7 +90,7 @@ impl TruthSet {
             let why = format!("there are {} samples", self.entries.len());
             return Err(DamagedSample {
                 sample: format!("sample {index}"),
-                fault: super::SampleFault::Part(why),
+                fault: super::ReadError::Other(why),
             });
         };
         read::sample(entry, self.layout).map_err(|fault| DamagedSample {

@@ -11,17 +11,17 @@ use super::layout::{Entry, Part, Role, TruthLayout};
 use crate::files::read_planes;
 use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Normals, ShLight, YDown, YUp};
-use crate::reader::SampleFault;
+use crate::reader::ReadError;
 use relit_data::text;
 
-pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, SampleFault> {
+pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, ReadError> {
     let parts = Parts { entry, layout };
     let whites = parts.whites()?;
     let image = parts.colour(Role::Image, 1.0)?;
     let albedo = parts.colour(Role::Albedo, 1.0)?;
     let shading = parts.colour(Role::Shading, whites.shading)?;
     let mask = parts.binary(Role::Mask)?;
-    let mask = mask.ok_or_else(|| SampleFault::missing("mask"))?;
+    let mask = mask.ok_or_else(|| ReadError::missing("mask"))?;
     let diffuse = match parts.colour(Role::Diffuse, 1.0)? {
         Some(diffuse) => Some(diffuse),
         None => product(albedo.as_ref(), shading.as_ref())?,
@@ -55,14 +55,14 @@ struct Parts<'a> {
 
 impl Parts<'_> {
     /// The image in a file whose largest value stands for `white`.
-    fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, SampleFault> {
+    fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, ReadError> {
         let transfer = self.layout.transfer(role);
         let image = self.read(role, |path| Rgb::<Linear>::read(path, transfer))?;
         let scaled = |image: Rgb<Linear>| image.into_planes().map(|value| value * white);
         Ok(image.map(|image| Rgb::new(scaled(image))))
     }
 
-    fn whites(&self) -> Result<Whites, SampleFault> {
+    fn whites(&self) -> Result<Whites, ReadError> {
         #[derive(Deserialize)]
         struct Description {
             white: Whites,
@@ -73,17 +73,17 @@ impl Parts<'_> {
                 highlight: 1.0,
             });
         };
-        let bytes = fs::read(path).map_err(SampleFault::read(path))?;
+        let bytes = fs::read(path).map_err(ReadError::read(path))?;
         let parsed: Result<Description, _> = serde_json::from_slice(text::unmarked(&bytes));
-        Ok(parsed.map_err(SampleFault::numbers(path))?.white)
+        Ok(parsed.map_err(ReadError::numbers(path))?.white)
     }
 
-    fn light(&self) -> Result<Option<ShLight>, SampleFault> {
+    fn light(&self) -> Result<Option<ShLight>, ReadError> {
         let Some(path) = self.path(Role::Light) else {
             return Ok(None);
         };
-        let text = text::read(path).map_err(SampleFault::read(path))?;
-        text.parse().map(Some).map_err(SampleFault::numbers(path))
+        let text = text::read(path).map_err(ReadError::read(path))?;
+        text.parse().map(Some).map_err(ReadError::numbers(path))
     }
 
     fn path(&self, role: Role) -> Option<&Path> {
@@ -91,7 +91,7 @@ impl Parts<'_> {
         part.map(|part| part.path.as_path())
     }
 
-    fn normals(&self) -> Result<Option<Normals<YUp>>, SampleFault> {
+    fn normals(&self) -> Result<Option<Normals<YUp>>, ReadError> {
         let normals = self.read(Role::Normals, |path| match self.layout {
             TruthLayout::Janner => read_turned_normals(path),
             _ => Normals::<YUp>::read(path),
@@ -103,7 +103,7 @@ impl Parts<'_> {
     }
 
     /// 1 where the file is at least half white.
-    fn binary(&self, role: Role) -> Result<Option<Planes<1>>, SampleFault> {
+    fn binary(&self, role: Role) -> Result<Option<Planes<1>>, ReadError> {
         self.read(role, |path| {
             let (planes, _) = read_planes(path)?;
             let extent = planes.extent();
@@ -118,7 +118,7 @@ impl Parts<'_> {
         &self,
         role: Role,
         read: impl Fn(&Path) -> Result<T, ImageError>,
-    ) -> Result<Option<T>, SampleFault> {
+    ) -> Result<Option<T>, ReadError> {
         let Some(Part { path, required, .. }) =
             self.entry.parts.iter().find(|part| part.role == role)
         else {
@@ -140,7 +140,7 @@ impl Parts<'_> {
 fn product(
     albedo: Option<&Rgb<Linear>>,
     shading: Option<&Rgb<Linear>>,
-) -> Result<Option<Rgb<Linear>>, SampleFault> {
+) -> Result<Option<Rgb<Linear>>, ReadError> {
     let (Some(albedo), Some(shading)) = (albedo, shading) else {
         return Ok(None);
     };
@@ -168,7 +168,7 @@ fn read_turned_normals(path: &Path) -> Result<Normals<YUp>, ImageError> {
 }
 
 /// The normals without those where `valid` is 0.
-fn only_where(normals: &Normals<YUp>, valid: &Planes<1>) -> Result<Normals<YUp>, SampleFault> {
+fn only_where(normals: &Normals<YUp>, valid: &Planes<1>) -> Result<Normals<YUp>, ReadError> {
     check_extent("map of valid normals", valid.extent(), normals.extent())?;
     let mut planes = normals.planes().clone();
     for plane in planes.planes_mut() {
@@ -179,7 +179,7 @@ fn only_where(normals: &Normals<YUp>, valid: &Planes<1>) -> Result<Normals<YUp>,
     Ok(Normals::new(planes))
 }
 
-fn check_extents(sample: &TruthSample) -> Result<(), SampleFault> {
+fn check_extents(sample: &TruthSample) -> Result<(), ReadError> {
     let size = |image: &Option<Rgb<Linear>>| image.as_ref().map(|rgb| rgb.planes().extent());
     let parts = [
         ("image", size(&sample.image)),

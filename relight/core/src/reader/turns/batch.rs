@@ -3,7 +3,7 @@
 use relit_data::shard::FrameRecord;
 
 use crate::image::{ColourSpace, Extent, Srgb, check_extent};
-use crate::reader::{DamagedSample, SampleFault};
+use crate::reader::{DamagedSample, ReadError};
 
 /// What the values of a batch are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,7 +110,7 @@ impl BatchBuilder {
         self.batch
     }
 
-    fn add(&mut self, frame: Frame) -> Result<(), SampleFault> {
+    fn add(&mut self, frame: Frame) -> Result<(), ReadError> {
         if self.batch.frames.is_empty() {
             self.batch.extent = frame.extent;
             let pixels = self.expected * frame.extent.pixels();
@@ -124,7 +124,7 @@ impl BatchBuilder {
         Ok(())
     }
 
-    fn add_mask(&mut self, mask: MaskBytes) -> Result<(), SampleFault> {
+    fn add_mask(&mut self, mask: MaskBytes) -> Result<(), ReadError> {
         let pixels = self.batch.extent.pixels();
         if self.last_mask.as_ref() == Some(&mask) && self.batch.masks.len() >= pixels {
             let last = self.batch.masks.len() - pixels..;

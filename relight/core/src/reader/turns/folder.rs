@@ -12,7 +12,7 @@ use super::batch::{Frame, MaskBytes, TurnFrame, extent_of};
 use crate::image::{Extent, ImageError, check_extent};
 use crate::parallel::caught;
 use crate::reader::listing::listed;
-use crate::reader::{DamagedSample, OpenError, SampleFault};
+use crate::reader::{DamagedSample, ReadError};
 
 /// The images of a video, and its mask.
 pub(super) struct FolderTurn {
@@ -28,7 +28,7 @@ pub(super) struct FolderTurn {
 
 impl FolderTurn {
     /// Looks for the frames of the video `name`; `expected` is their number.
-    pub(super) fn open(root: &Path, name: &str, expected: Option<u32>) -> Result<Self, OpenError> {
+    pub(super) fn open(root: &Path, name: &str, expected: Option<u32>) -> Result<Self, ReadError> {
         let folder = root.join("imgs").join(name);
         let numbered: BTreeMap<u32, String> = listed(&folder, Path::is_file)?
             .iter()
@@ -69,21 +69,21 @@ impl FolderTurn {
             .get(position as usize)
             .copied()
             .unwrap_or(position);
-        let frame = caught(|| self.decode(index)).map_err(SampleFault::from);
+        let frame = caught(|| self.decode(index)).map_err(ReadError::from);
         frame.flatten().map_err(|fault| DamagedSample {
             sample: format!("{}, frame {index}", self.folder.display()),
             fault,
         })
     }
 
-    fn decode(&self, index: u32) -> Result<Frame, SampleFault> {
+    fn decode(&self, index: u32) -> Result<Frame, ReadError> {
         let file = self.files.get(index as usize).and_then(Option::as_ref);
         let file =
-            file.ok_or_else(|| SampleFault::missing(&format!("image, {index}.png or .jpg,")))?;
+            file.ok_or_else(|| ReadError::missing(&format!("image, {index}.png or .jpg,")))?;
         let (mask, mask_extent) = self
             .mask
             .as_ref()
-            .map_err(|why| SampleFault::Part(why.clone()))?;
+            .map_err(|why| ReadError::Other(why.clone()))?;
         let image = read_image(&self.folder.join(file))?.into_rgb8();
         let extent = extent_of(image.width(), image.height());
         check_extent("mask", *mask_extent, extent)?;
@@ -109,14 +109,14 @@ fn frame_of(path: &Path) -> Option<(u32, String)> {
     (is_image && number < MAX_SAMPLES).then_some((number, name))
 }
 
-fn read_mask(path: &Path) -> Result<(Arc<Vec<u8>>, Extent), SampleFault> {
+fn read_mask(path: &Path) -> Result<(Arc<Vec<u8>>, Extent), ReadError> {
     let mask = read_image(path)?.into_luma8();
     let extent = extent_of(mask.width(), mask.height());
     Ok((Arc::new(mask.into_raw()), extent))
 }
 
-fn read_image(path: &Path) -> Result<::image::DynamicImage, SampleFault> {
-    let bytes = fs::read(path).map_err(SampleFault::read(path))?;
+fn read_image(path: &Path) -> Result<::image::DynamicImage, ReadError> {
+    let bytes = fs::read(path).map_err(ReadError::read(path))?;
     let decoded = ::image::load_from_memory(&bytes).map_err(StillError::Decode);
     Ok(decoded.map_err(ImageError::still(path))?)
 }

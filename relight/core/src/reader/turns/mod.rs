@@ -10,7 +10,7 @@ use crate::parallel;
 use relit_data::shard::{Dataset, Layout};
 
 use super::listing::listed;
-use super::{DamagedSample, OpenError, SampleId, Source};
+use super::{DamagedSample, ReadError, SampleId, Source};
 use batch::{BatchBuilder, Frame};
 use folder::FolderTurn;
 use shard::ShardTurn;
@@ -44,8 +44,8 @@ impl Turns {
     ///   object is.
     ///
     /// # Errors
-    /// [`OpenError::Read`], [`OpenError::Dataset`], [`OpenError::Content`].
-    pub fn open(path: &Path, encoding: Encoding) -> Result<Self, OpenError> {
+    /// If it cannot be read, or holds no samples.
+    pub fn open(path: &Path, encoding: Encoding) -> Result<Self, ReadError> {
         let turns = if path.is_file() {
             let shard = ShardTurn::open(path, None)?;
             if let Some(why) = shard.whole_loss() {
@@ -54,12 +54,12 @@ impl Turns {
                 } else {
                     why
                 };
-                return Err(OpenError::Content {
-                    path: path.to_owned(),
-                    fault: format!(
+                return Err(ReadError::file(
+                    path,
+                    format!(
                         "holds no sample that can be read ({why}): give a shard (.tar) as relit-extract writes them"
                     ),
-                });
+                ));
             }
             vec![Turn::Shard(shard)]
         } else if path.join(Dataset::FILE).is_file() {
@@ -70,7 +70,7 @@ impl Turns {
             open_shards(&listed(path, is_shard)?)?
         };
         if turns.iter().all(|turn| turn.samples() == 0) {
-            return Err(OpenError::empty(
+            return Err(ReadError::empty(
                 path,
                 "dataset.json, shards (*.tar) or a folder imgs",
             ));
@@ -138,11 +138,8 @@ impl Source for Turns {
     }
 }
 
-fn open_dataset(path: &Path) -> Result<Vec<Turn>, OpenError> {
-    let dataset = Dataset::read(path).map_err(|source| OpenError::Dataset {
-        path: path.to_owned(),
-        source,
-    })?;
+fn open_dataset(path: &Path) -> Result<Vec<Turn>, ReadError> {
+    let dataset = Dataset::read(path).map_err(ReadError::dataset(path))?;
     let layout = dataset.settings.layout;
     let open = |at: usize| {
         let shard = &dataset.shards[at];
@@ -160,12 +157,12 @@ fn open_dataset(path: &Path) -> Result<Vec<Turn>, OpenError> {
         .collect()
 }
 
-fn open_shards(paths: &[PathBuf]) -> Result<Vec<Turn>, OpenError> {
+fn open_shards(paths: &[PathBuf]) -> Result<Vec<Turn>, ReadError> {
     let open = |at: usize| ShardTurn::open(&paths[at], None).map(Turn::Shard);
     parallel::map(paths.len(), open).into_iter().collect()
 }
 
-fn open_folders(path: &Path) -> Result<Vec<Turn>, OpenError> {
+fn open_folders(path: &Path) -> Result<Vec<Turn>, ReadError> {
     let folders = listed(&path.join("imgs"), Path::is_dir)?;
     let open = |at: usize| {
         let name = folders[at]

@@ -11,7 +11,7 @@ use relit_data::shard::{SampleSpan, SampleSpans, ShardReader, ShardSample, decod
 use crate::parallel::caught;
 
 use super::batch::{Frame, MaskBytes, TurnFrame, extent_of};
-use crate::reader::{DamagedSample, OpenError, SampleFault};
+use crate::reader::{DamagedSample, ReadError};
 
 /// Bytes that are read at a time while looking for samples: a header and what follows it closely.
 const SCAN_BUFFER: usize = 1 << 10;
@@ -36,17 +36,10 @@ enum Slot {
 
 impl ShardTurn {
     /// Looks for the samples of a shard; `expected` is their number.
-    pub(super) fn open(path: &Path, expected: Option<u32>) -> Result<Self, OpenError> {
-        let failed = |source| OpenError::Read {
-            path: path.to_owned(),
-            source,
-        };
-        let file = File::open(path).map_err(failed)?;
+    pub(super) fn open(path: &Path, expected: Option<u32>) -> Result<Self, ReadError> {
+        let file = File::open(path).map_err(ReadError::read(path))?;
         let spans = SampleSpans::new(BufReader::with_capacity(SCAN_BUFFER, file));
-        let spans = spans.map_err(|source| OpenError::Dataset {
-            path: path.to_owned(),
-            source,
-        })?;
+        let spans = spans.map_err(ReadError::dataset(path))?;
         let mut slots = Vec::new();
         for span in spans {
             match span {
@@ -97,17 +90,17 @@ impl ShardTurn {
         };
         let bytes = match self.slots.get(position as usize) {
             Some(Slot::At(place)) => self.read(place).map_err(damage)?,
-            Some(Slot::Lost(why)) => return Err(damage(SampleFault::Part(why.clone()))),
+            Some(Slot::Lost(why)) => return Err(damage(ReadError::Other(why.clone()))),
             None => {
                 let why = "the sample is missing".to_owned();
-                return Err(damage(SampleFault::Part(why)));
+                return Err(damage(ReadError::Other(why)));
             }
         };
-        let frame = caught(|| decode(&bytes)).map_err(SampleFault::from);
+        let frame = caught(|| decode(&bytes)).map_err(ReadError::from);
         frame.flatten().map_err(damage)
     }
 
-    fn read(&self, place: &Range<u64>) -> Result<Vec<u8>, SampleFault> {
+    fn read(&self, place: &Range<u64>) -> Result<Vec<u8>, ReadError> {
         let read = || {
             let mut file = File::open(&self.path)?;
             file.seek(SeekFrom::Start(place.start))?;
@@ -115,7 +108,7 @@ impl ShardTurn {
             file.take(place.end - place.start).read_to_end(&mut bytes)?;
             Ok(bytes)
         };
-        read().map_err(SampleFault::read(&self.path))
+        read().map_err(ReadError::read(&self.path))
     }
 }
 
@@ -147,15 +140,15 @@ fn add_missing(slots: &mut Vec<Slot>, expected: Option<u32>) {
     }
 }
 
-fn decode(bytes: &[u8]) -> Result<Frame, SampleFault> {
+fn decode(bytes: &[u8]) -> Result<Frame, ReadError> {
     let mut reader = ShardReader::new(bytes.chain(&END[..]));
     let sample = reader
         .next()
         .transpose()?
-        .ok_or_else(|| SampleFault::missing("png"))?;
+        .ok_or_else(|| ReadError::missing("png"))?;
     let image = decode_rgb(part(&sample, "png")?)?;
     let record = serde_json::from_slice(part(&sample, "json")?)
-        .map_err(|fault| SampleFault::Part(format!("its record does not parse: {fault}")))?;
+        .map_err(|fault| ReadError::Other(format!("its record does not parse: {fault}")))?;
     let mask = MaskBytes::Png(part(&sample, "mask.png")?.to_vec());
     Ok(Frame {
         extent: extent_of(image.width(), image.height()),
@@ -168,8 +161,8 @@ fn decode(bytes: &[u8]) -> Result<Frame, SampleFault> {
     })
 }
 
-fn part<'a>(sample: &'a ShardSample, suffix: &str) -> Result<&'a [u8], SampleFault> {
+fn part<'a>(sample: &'a ShardSample, suffix: &str) -> Result<&'a [u8], ReadError> {
     sample
         .member(suffix)
-        .ok_or_else(|| SampleFault::missing(suffix))
+        .ok_or_else(|| ReadError::missing(suffix))
 }
