@@ -18,7 +18,7 @@ use crate::values::{GATES, one_of};
 /// Photographs, and where their objects are.
 #[derive(Args)]
 pub(crate) struct PhotoArguments {
-    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
+    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), or folders of them.
     #[arg(required = true, value_name = "PHOTO")]
     pub(crate) photos: Vec<PathBuf>,
     /// A grey image of the photograph's size, white on the object; or a folder of them, PHOTO.png [default: the photograph's
@@ -34,11 +34,9 @@ pub(crate) struct PhotoArguments {
 }
 
 impl PhotoArguments {
-    /// Whether one of the inputs is a folder or a shard.
+    /// Whether one of the inputs is a folder.
     pub(crate) fn has_set(&self) -> bool {
-        self.photos
-            .iter()
-            .any(|path| path.is_dir() || path.extension().is_some_and(|e| e == "tar"))
+        self.photos.iter().any(|path| path.is_dir())
     }
 
     pub(crate) fn reading(&self) -> PhotoReading {
@@ -49,14 +47,13 @@ impl PhotoArguments {
         }
     }
 
-    /// The photographs, of each shard at most so many; names the files of folders that are not used.
+    /// The photographs; names the files of folders that are not used.
     pub(crate) fn find(
         &self,
-        most: Option<u32>,
         output: &Path,
         console: Console,
     ) -> Result<PhotoList, DecomposeError> {
-        let mut found = PhotoInput::find(&self.photos, most)?;
+        let mut found = PhotoInput::find(&self.photos)?;
         found
             .unused
             .retain(|file| !is_at(&file.path, self.mask.as_deref(), output));

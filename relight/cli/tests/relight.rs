@@ -17,7 +17,6 @@ use relight_core::image::{ColourSpace, Extent, Planes, Rgb as Picture, Srgb};
 use relight_core::light::{Normals, Order, Panorama, ShLight};
 use relight_core::render::Surface;
 use relight_photo::nets::{WeightPrecision, Weights, decomposer};
-use relight_photo::relighting::InsertError;
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -185,7 +184,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
                 "{one} --mask masks/one.png --light black.exr --weights w.safetensors -o o.png"
             ),
             1,
-            dark.as_str(),
+            dark,
         ),
         (
             format!("{one} --mask masks/one.png --light text.txt -o o.png"),

@@ -20,7 +20,7 @@ use relight_synth::{
     write_sequences,
 };
 use relight_turn::{
-    Elevation, MaterialKind, TableFrame, TableRotation, TurnError, fit_turn_light, read_curves,
+    Elevation, MaterialKind, TableFrame, TableRotation, fit_turn_light, read_curves,
 };
 use relit_test_support::is_named;
 

@@ -26,9 +26,7 @@ Examples:
   relight decompose cut-out.png -o cut-out
       a photograph whose alpha is the mask
   relight decompose photos --mask masks -o out
-      a folder of photographs, with masks of the same names: out/<name>/
-  relight decompose turn.tar --count 12 -o out
-      twelve frames of a shard, spread over the turn: out/<session>/<index>/";
+      a folder of photographs, with masks of the same names: out/<name>/";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -36,9 +34,6 @@ pub(crate) struct Arguments {
     photos: PhotoArguments,
     #[command(flatten)]
     folder: OutputFolder,
-    /// Decompose only the first N samples of each shard, which are spread over the turn.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    count: Option<u32>,
     /// Photographs decomposed in parallel [default: one per core, at most 4].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
@@ -52,32 +47,6 @@ pub(crate) struct Arguments {
 impl Arguments {
     /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
-        self.frames_fault().or_else(|| self.mask_fault())
-    }
-
-    fn frames_fault(&self) -> Option<String> {
-        let Some(frames) = self
-            .photos
-            .photos
-            .iter()
-            .find(|path| PhotoInput::has_frames(path))
-        else {
-            let given = self.count.is_some();
-            return given.then(|| "--count needs a shard (.tar)".to_owned());
-        };
-        let given = [
-            ("--mask", self.photos.mask.is_some()),
-            ("--rect", self.photos.rect.is_some()),
-            ("--transfer", self.photos.encoding.transfer.is_some()),
-        ];
-        let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
-        let frames = frames.display();
-        Some(format!(
-            "{option} is for photographs: the frames of {frames} have their own masks and are sRGB"
-        ))
-    }
-
-    fn mask_fault(&self) -> Option<String> {
         let mask = self.photos.mask.as_ref().filter(|mask| !mask.is_dir())?;
         let is_one = matches!(self.photos.photos.as_slice(), [photo] if !photo.is_dir());
         (!is_one).then(|| {
@@ -95,7 +64,7 @@ impl Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let found = (arguments.photos).find(arguments.count, &arguments.folder.output, console)?;
+    let found = (arguments.photos).find(&arguments.folder.output, console)?;
     let inputs = &found.inputs;
     let own_folders = inputs.len() > 1 || arguments.photos.has_set();
     let run = Run::new(arguments, own_folders)?;
@@ -170,10 +139,9 @@ impl Run {
     fn decompose(&self, input: &PhotoInput) -> Result<Decomposed, DecomposeError> {
         let photo = input.load(&self.reading)?;
         let out = if self.own_folders {
-            // Frames of one turn have a folder together.
-            let first = photo.name.split('/').next().unwrap_or_default();
-            PhotoInput::check_result(&self.output.join(first))?;
-            self.output.join(&photo.name)
+            let out = self.output.join(&photo.name);
+            PhotoInput::check_result(&out)?;
+            out
         } else {
             self.output.clone()
         };
@@ -193,7 +161,7 @@ impl Run {
         let figures: DecompositionFigures = files.write(&out)?;
         let source = match photo.mask_source {
             MaskSource::BlackBackground => "; the object is what is not black",
-            MaskSource::File | MaskSource::Alpha | MaskSource::Rectangle | MaskSource::Shard => "",
+            MaskSource::File | MaskSource::Alpha | MaskSource::Rectangle => "",
         };
         let highlights = if found.is_glossy {
             "separated"

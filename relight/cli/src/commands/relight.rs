@@ -187,7 +187,7 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let found = arguments.photos.find(None, &arguments.output, console)?;
+    let found = arguments.photos.find(&arguments.output, console)?;
     let inputs = &found.inputs;
     let run = Run {
         arguments,
@@ -197,7 +197,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         },
         network: OnceLock::new(),
         reading: arguments.photos.reading(),
-        photos: inputs.iter().filter_map(file_of).collect(),
+        photos: inputs.iter().map(|input| input.path.clone()).collect(),
     };
     if !arguments.is_set()
         && let [input] = inputs.as_slice()
@@ -352,12 +352,5 @@ impl Run<'_> {
         MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;
         bar.finish_and_clear();
         Ok(frames)
-    }
-}
-
-fn file_of(input: &PhotoInput) -> Option<PathBuf> {
-    match input {
-        PhotoInput::File(path) => Some(path.clone()),
-        _ => None,
     }
 }

@@ -107,7 +107,7 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
     assert!(error.unwrap_err().to_string().contains("masks/grey.png"));
     let find = |paths: &[&PathBuf]| {
         let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
-        PhotoInput::find(&paths, None).map(|found| found.inputs.len())
+        PhotoInput::find(&paths).map(|found| found.inputs.len())
     };
     let empty = find(&[&masks]).unwrap_err();
     assert!(is_named(&empty.to_string(), &["masks"]), "{empty}");

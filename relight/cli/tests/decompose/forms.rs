@@ -95,7 +95,7 @@ fn every_file_of_a_folder_is_used_or_named() {
     write("later/k.jpg", &jpeg);
     write("done/albedo.png", &jpeg);
     write("done/decomposition.json", b"{}");
-    let PhotoList { inputs, unused } = PhotoInput::find(&[folder.path("photos")], None).unwrap();
+    let PhotoList { inputs, unused } = PhotoInput::find(&[folder.path("photos")]).unwrap();
     let used: Vec<String> = inputs.iter().map(PhotoInput::place).collect();
     let name = |path: &str| {
         PathBuf::from(path)
@@ -122,8 +122,7 @@ fn a_folder_of_nothing_that_is_read_says_what_it_holds() {
     folder.save("a.cr2", |path| {
         fs::write(path, b"II*\0\x10\0\0\0CR\x02\0").unwrap()
     });
-    let fault =
-        PhotoInput::find(&[folder.0.path().to_owned()], None).map(|found| found.inputs.len());
+    let fault = PhotoInput::find(&[folder.0.path().to_owned()]).map(|found| found.inputs.len());
     let text = fault.unwrap_err().to_string();
     assert!(text.contains("raw"), "{text}");
 }

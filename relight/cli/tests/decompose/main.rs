@@ -14,6 +14,5 @@ mod masks;
 mod networks;
 mod program;
 mod results;
-mod shards;
 mod support;
 mod values;

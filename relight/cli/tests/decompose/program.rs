@@ -5,7 +5,6 @@ use std::process::{Command, Output};
 
 use relight_photo::nets::{WeightPrecision, Weights, decomposer};
 
-use crate::shards::write_shard;
 use crate::support::{Folder, names_in, object};
 
 fn relight(folder: &Folder, arguments: &str) -> Output {
@@ -79,21 +78,8 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
     assert_eq!(of("failed").unwrap()["photo"], "photos/grey.png");
     assert_eq!(events.len(), 2);
 
-    fs::create_dir(folder.path("shards")).unwrap();
-    write_shard(&folder.path("shards"));
     for (command, code, named) in [
-        ("decompose shards --rect 1,2,3,4 -o o", 2, "--rect"),
-        (
-            "decompose shards/20261120T093015Z-mug.tar --transfer linear -o o",
-            2,
-            "--transfer",
-        ),
-        (
-            "decompose photos shards --mask photos -o o",
-            2,
-            "relight decompose",
-        ),
-        ("decompose photos --count 3 -o o", 2, "--count"),
+        ("decompose turn.tar -o o", 1, "relight turn"),
         (
             "weights export w.safetensors -o w.txt",
             2,

@@ -40,7 +40,10 @@ pub(crate) fn mask() -> GrayImage {
 }
 
 pub(crate) fn load(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
-    PhotoInput::File(path.to_owned()).load(reading)
+    PhotoInput {
+        path: path.to_owned(),
+    }
+    .load(reading)
 }
 
 pub(crate) fn with_mask(path: PathBuf) -> PhotoReading {

@@ -254,10 +254,13 @@ fn exposed(
 
 #[cfg(test)]
 mod tests {
-    use relight_core::image::Planes;
+    use std::path::Path;
+
+    use relight_core::image::{ColourImage, Planes, Samples, StoredImage, Transfer};
     use relight_core::light::{Order, ShLight};
 
     use super::*;
+    use crate::decompose::PhotoHints;
     use crate::relighting::DiscLamp;
 
     fn described(more: &str) -> SceneDescription {
@@ -418,12 +421,24 @@ mod tests {
     #[test]
     fn a_photograph_is_brought_to_the_size_in_which_its_object_is_shown() {
         let extent = Extent::new(400, 300);
-        let picture = Rgb::new(Planes::filled(extent, [0.5; 3]));
+        let picture = Planes::filled(extent, [0.5; 3]);
         // The object is 150 rows high, and shown in half of 48 rows.
         let mask = Planes::from_fn(extent, |_, y| {
-            [f32::from(u8::from((100..250).contains(&y)))]
+            [f32::from(u8::from((100..250).contains(&y))); 3]
         });
-        let photo = Photo::from_frame("a".into(), picture, mask, None).unwrap();
+        let stored = |planes| StoredImage {
+            planes,
+            alpha: None,
+            samples: Samples::Float,
+        };
+        let path = Path::new("a");
+        let mask = stored(mask);
+        let hints = PhotoHints {
+            mask: Some((path, &mask)),
+            ..PhotoHints::default()
+        };
+        let picture = ColourImage::new(stored(picture), Transfer::Linear);
+        let photo = Photo::from_image(path, picture, &hints).unwrap();
         let background = dusk();
         let environment =
             SceneEnvironment::new(&described(""), SceneBackground::Picture(&background), None);

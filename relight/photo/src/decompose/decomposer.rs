@@ -46,9 +46,6 @@ pub struct DecomposeOptions {
     pub specular: SpecularGate,
     /// Light from which on a channel counts as saturated; a pixel is, where all three are.
     pub saturated_from: f32,
-    /// The part of the object's pixels that are saturated, where it is known from a larger picture;
-    /// else it is counted.
-    pub saturated_fraction: Option<f64>,
     /// Whether [`Decomposition::paint`] is wanted.
     pub paint: bool,
 }
@@ -59,7 +56,6 @@ impl Default for DecomposeOptions {
             mirror: true,
             specular: SpecularGate::default(),
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
-            saturated_fraction: None,
             paint: false,
         }
     }
@@ -200,9 +196,7 @@ impl Decomposer {
         let extent = picture.planes().extent();
         check_mask_size(mask.extent(), extent)?;
         let object = CutObject::new(picture, mask)?;
-        let saturated_fraction = options
-            .saturated_fraction
-            .unwrap_or_else(|| object.saturated(options.saturated_from));
+        let saturated_fraction = object.saturated(options.saturated_from);
         let is_glossy = match options.specular {
             SpecularGate::Auto => spec_net_gate::opens(saturated_fraction, SPEC_NET_GATE),
             SpecularGate::On => true,

@@ -13,8 +13,6 @@ use crate::nets::NetError;
 use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
 use relight_core::light::LightError;
-#[cfg(feature = "files")]
-use relight_core::reader::{DamagedSample, ReadError};
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -47,14 +45,6 @@ pub enum DecomposeError {
         /// The photograph.
         path: PathBuf,
     },
-    /// A data set cannot be opened.
-    #[cfg(feature = "files")]
-    #[error(transparent)]
-    Open(#[from] ReadError),
-    /// A sample of a shard is damaged.
-    #[cfg(feature = "files")]
-    #[error("a sample is damaged")]
-    Damage(#[from] DamagedSample),
     /// No light can be fitted.
     #[error("no light can be fitted")]
     Light(#[from] LightError),

@@ -24,8 +24,6 @@ pub enum MaskSource {
     BlackBackground,
     /// A rectangle, within which the object was cut out.
     Rectangle,
-    /// The mask of a shard's frame.
-    Shard,
 }
 
 /// Why the colours of a photograph do not show where the object is.

@@ -6,9 +6,7 @@ use super::decomposer::{DecomposeOptions, check_mask_size, check_size};
 use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, before_black, cut_out_within, is_empty, mask_of_alpha};
 use super::usable_image::UsableImage;
-use relight_core::image::{
-    ColourImage, ColourSpace, Extent, Linear, Planes, Rgb, Srgb, StoredImage, Transfer,
-};
+use relight_core::image::{ColourImage, Extent, Linear, Planes, Rgb, StoredImage, Transfer};
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
 use relit_data::image_stats::SATURATED_VALUE;
@@ -16,7 +14,7 @@ use relit_data::image_stats::SATURATED_VALUE;
 /// A picture with its mask.
 #[derive(Debug, Clone)]
 pub struct Photo {
-    /// Its name: the file's without ending, or a frame's key `<session>/<index>`.
+    /// Its name: the file's without ending.
     pub name: String,
     /// The light.
     pub picture: Rgb<Linear>,
@@ -31,7 +29,6 @@ pub struct Photo {
     /// The file's alpha, 0 to 1.
     pub alpha: Option<Planes<1>>,
     saturated_from: f32,
-    saturated_fraction: Option<f64>,
 }
 
 /// What is known about a photograph besides its file.
@@ -128,31 +125,6 @@ impl Photo {
             scale,
             notes,
             alpha,
-            saturated_fraction: None,
-        })
-    }
-
-    /// A frame of a data set, with its mask and its saturation.
-    ///
-    /// # Errors
-    /// If the mask is empty.
-    pub fn from_frame(
-        name: String,
-        picture: Rgb<Linear>,
-        mask: Planes<1>,
-        saturated_fraction: Option<f64>,
-    ) -> Result<Self, DecomposeError> {
-        check_mask(&mask, None)?;
-        Ok(Self {
-            name,
-            picture,
-            mask,
-            mask_source: MaskSource::Shard,
-            scale: 1.0,
-            notes: Vec::new(),
-            alpha: None,
-            saturated_from: Srgb::to_linear(SATURATED_VALUE),
-            saturated_fraction,
         })
     }
 
@@ -171,11 +143,10 @@ impl Photo {
         self
     }
 
-    /// These options with what is known of the photograph's saturation.
+    /// These options with the light that is saturated in the photograph.
     pub fn options(&self, options: &DecomposeOptions) -> DecomposeOptions {
         DecomposeOptions {
             saturated_from: self.saturated_from,
-            saturated_fraction: self.saturated_fraction,
             ..*options
         }
     }

@@ -216,11 +216,6 @@ fn the_gate_opens_where_more_than_five_percent_are_saturated() {
     assert!(open.highlight.pixel(0, 0)[0] > 0.9);
     assert!(decompose(0, SpecularGate::On).is_glossy);
     assert!(!decompose(1600, SpecularGate::Off).is_glossy);
-    let known = DecomposeOptions {
-        saturated_fraction: Some(0.2),
-        ..DecomposeOptions::default()
-    };
-    assert!(net.decompose(&white(0), &mask, &known).unwrap().is_glossy);
 }
 
 #[test]

@@ -79,7 +79,7 @@ impl InsertSource {
             rectangle,
             transfer: object.transfer,
         };
-        let photo = PhotoInput::File(path).load(&reading)?;
+        let photo = PhotoInput { path }.load(&reading)?;
         Ok(Self::Photo(Box::new(photo)))
     }
 }
