@@ -124,7 +124,7 @@ pub fn jobs<T: Sync, R: Send>(items: &[T], count: usize, job: impl Fn(&T) -> R +
     results.into_iter().map(|(_, result)| result).collect()
 }
 
-#[cfg(all(test, feature = "threads"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
