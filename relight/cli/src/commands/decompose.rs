@@ -39,9 +39,6 @@ pub(crate) struct Arguments {
     threads: Option<usize>,
     #[command(flatten, next_help_heading = "Network")]
     network: NetworkArguments,
-    /// Do not average with the mirror image: faster, and slightly worse.
-    #[arg(long)]
-    no_mirror: bool,
 }
 
 impl Arguments {
@@ -53,13 +50,6 @@ impl Arguments {
             let mask = mask.display();
             format!("--mask {mask} is one mask for several photographs: give a folder of masks")
         })
-    }
-
-    fn options(&self) -> DecomposeOptions {
-        DecomposeOptions {
-            mirror: !self.no_mirror,
-            ..self.network.options()
-        }
     }
 }
 
@@ -129,7 +119,7 @@ impl Run {
         Ok(Self {
             decomposer: Decomposer::new(&weights)?,
             weights: name,
-            options: arguments.options(),
+            options: arguments.network.options(),
             reading: arguments.photos.reading(),
             output: arguments.folder.output.clone(),
             own_folders,

@@ -30,7 +30,7 @@ fn a_file_of_a_folder_that_is_not_used_is_named_and_the_code_says_so() {
     fs::create_dir(folder.path("photos")).unwrap();
     object(0).save(folder.path("photos/black.png")).unwrap();
     fs::write(folder.path("photos/._black.png"), "of macOS").unwrap();
-    let command = "decompose photos -o out --weights w.safetensors --no-mirror --json";
+    let command = "decompose photos -o out --weights w.safetensors --json";
     assert_eq!(code_and_errors(&relight(&folder, command)).0, 0);
     fs::write(
         folder.path("photos/x.avif"),
@@ -58,7 +58,7 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
     fs::create_dir(folder.path("photos")).unwrap();
     object(0).save(folder.path("photos/black.png")).unwrap();
     object(90).save(folder.path("photos/grey.png")).unwrap();
-    let command = "decompose photos -o out --weights w.safetensors --no-mirror --json";
+    let command = "decompose photos -o out --weights w.safetensors --json";
     let output = relight(&folder, command);
     let (code, errors) = code_and_errors(&output);
     assert_eq!(code, 3, "{errors}");

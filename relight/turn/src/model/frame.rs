@@ -112,11 +112,6 @@ impl TableFrame {
         [x, self.sin * y - self.cos * z, self.cos * y + self.sin * z]
     }
 
-    /// A vector of the table's frame in the viewer's.
-    pub fn to_viewer(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        [x, self.sin * y + self.cos * z, self.sin * z - self.cos * y]
-    }
-
     /// The table's axis, upwards, in the viewer's frame.
     pub const fn axis(&self) -> [f64; 3] {
         [0.0, self.cos, self.sin]
@@ -146,9 +141,6 @@ mod tests {
         let apply = frame.rotation();
         let row = apply.matrix()[2];
         assert!((row[1] - cos).abs() < 1e-12 && (row[2] - sin).abs() < 1e-12);
-        let there = [0.3, -0.5, 0.8];
-        let back = frame.to_viewer(frame.to_table(there));
-        assert!(back.iter().zip(there).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
     #[test]
