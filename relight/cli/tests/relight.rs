@@ -532,16 +532,6 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
 }
 
 #[test]
-fn what_is_withheld_of_a_lamp_is_told_and_is_a_third_at_most() {
-    let folder = Folder::new();
-    let lamp = "relight photos/one.png --mask masks/one.png --lamp -70,30 --weights w.safetensors";
-    let output = folder.run(&format!("--json {lamp} -o o.png"));
-    let relit = relit_event(&output.stdout);
-    let withheld = relit["withheld"].as_f64().unwrap();
-    assert!((0.0..=1.0 / 3.0).contains(&withheld), "{withheld}");
-}
-
-#[test]
 fn float_photographs_are_made_usable_by_every_verb_with_warnings_in_the_same_words() {
     let folder = Folder::new();
     let extent = Extent::new(WIDTH as usize, HEIGHT as usize);
@@ -607,14 +597,8 @@ fn a_decomposition_s_folder_is_an_object_and_a_rectangle_shows_one() {
     assert_eq!(folder.code_and_errors(command), (0, String::new()));
     let (lit, _) = read_planes(&folder.path("lit.png")).unwrap();
     assert!(lit.pixel(32, 24)[0] > 0.2 && lit.pixel(13, 5) == [0.0; 3]);
-    let command = format!("insert cut --into photos/two.png --json {common} folder.png");
-    let output = folder.run(&command);
-    assert_eq!(output.status.code(), Some(0));
-    let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    // The background is blue: its light is taken as less so.
-    let blue = |what: &str| event["light_colour"][what][2].as_f64().unwrap();
-    assert!(blue("found") > 1.2 && blue("used") > 1.0);
-    assert!(blue("used") - 1.0 < 0.3 * (blue("found") - 1.0), "{event}");
+    let command = format!("insert cut --into photos/two.png {common} folder.png");
+    assert_eq!(folder.code_and_errors(&command).0, 0);
     let command = format!("insert cut {rect} --into photos/two.png {common} none.png");
     let (code, errors) = folder.code_and_errors(&command);
     assert!(code == 1 && errors.contains("cut"), "{errors}");

@@ -12,7 +12,7 @@ use relight_photo::files::{
 };
 use relight_photo::relighting::{
     Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, RelightableObject,
-    RelightingSequence, WhiteBalance, likeness,
+    RelightingSequence, WhiteBalance,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -39,8 +39,6 @@ Examples:
 
 /// The default for the longest side of a video's frames.
 const MOVIE_SIDE: usize = 1080;
-/// The least withheld part of a change that is reported.
-const MIN_WITHHELD: f32 = 0.005;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -259,17 +257,8 @@ impl Run<'_> {
             }
         };
         let seconds = start.elapsed().as_secs_f64();
-        let withheld = shot.withheld(arguments.light.angle());
-        let withheld_note = if withheld >= MIN_WITHHELD {
-            format!(
-                "; {:.0} % of the change in shading is withheld, because the object's shape is uncertain",
-                100.0 * withheld
-            )
-        } else {
-            String::new()
-        };
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{withheld_note}",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition",
             output.display(),
         );
         let event = json!({
@@ -279,8 +268,6 @@ impl Run<'_> {
             "frames": frames,
             "seconds": seconds,
             "decompose_seconds": decomposed,
-            "likeness": likeness(&relightable.light, &light),
-            "withheld": withheld,
         });
         console.print(&text, &event);
         Ok(())

@@ -21,5 +21,5 @@ pub use description::{LightDescription, ObjectDescription, SceneDescription};
 pub use harmonisation::Harmonisation;
 pub use layer::SceneLayer;
 pub use scene::InsertScene;
-pub use scene_environment::{EstimatedColours, SceneBackground, SceneEnvironment};
+pub use scene_environment::{SceneBackground, SceneEnvironment};
 pub use scene_object::SceneObject;

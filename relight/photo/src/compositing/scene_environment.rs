@@ -35,15 +35,6 @@ pub enum SceneBackground<'a> {
     Panorama(&'a Panorama),
 }
 
-/// The colours of light that was estimated from a picture, as means over all directions, red, green and blue with the mean 1.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct EstimatedColours {
-    /// As the picture has them, which is also the colour of what it shows.
-    pub found: [f64; 3],
-    /// As they light the objects.
-    pub used: [f64; 3],
-}
-
 /// The setting of a scene: what follows from its description and background, before the objects.
 #[derive(Debug, Clone)]
 pub struct SceneEnvironment {
@@ -57,8 +48,8 @@ pub struct SceneEnvironment {
     pub harmonisation: Harmonisation,
     /// The sun in a picture that gives the light.
     pub sun: Option<SeenSun>,
-    /// The colours of the light that a picture gives.
-    pub estimated: Option<EstimatedColours>,
+    /// Whether the light is estimated from a picture.
+    pub is_estimated: bool,
     /// How a panorama is exposed.
     pub exposure: Option<PanoramaExposure>,
     /// The light as coefficients.
@@ -123,10 +114,6 @@ impl SceneEnvironment {
         } else {
             shown.light()?
         };
-        let estimated = is_estimated.then(|| EstimatedColours {
-            found: mean_colour(&coefficients),
-            used: mean_colour(&projected),
-        });
         let light = shown;
         let around = for_shadows(light.panorama());
         let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
@@ -158,7 +145,7 @@ impl SceneEnvironment {
             tilt: Self::ground_tilt(scene, background),
             harmonisation,
             sun,
-            estimated,
+            is_estimated,
             exposure,
             is_one_light,
             projected,
@@ -210,13 +197,6 @@ impl SceneEnvironment {
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
         view.exposed(panorama, turn, self.panorama_scale)
     }
-}
-
-/// The mean colour of light over all directions, with the mean 1.
-fn mean_colour(light: &ShLight) -> [f64; 3] {
-    let mean = light.coefficients().first().copied().unwrap_or([1.0; 3]);
-    let grey = mean.iter().sum::<f64>() / 3.0;
-    mean.map(|channel| channel / grey.max(f64::MIN_POSITIVE))
 }
 
 /// A panorama no larger than shadows need it: it is turned and looked at again and again.
@@ -367,15 +347,18 @@ mod tests {
             let background = SceneBackground::Picture(picture);
             SceneEnvironment::new(&described(more), background, None).unwrap()
         };
-        let warm = of(&dusk(), "").estimated.unwrap();
+        let colour = |more| {
+            let [mean, ..] = of(&dusk(), more).projected.coefficients() else {
+                panic!("no light");
+            };
+            mean.map(|channel| 3.0 * channel / mean.iter().sum::<f64>())
+        };
+        let (kept, used) = (colour("white_balance = \"light\""), colour(""));
         // The picture is 0.3, 0.2, 0.1: after von Kries, with D = 0.7726, 1.5 becomes 0.7726 + 0.2274 x 1.5.
-        for (found, (used, wanted)) in warm.found.iter().zip(warm.used.iter().zip([1.5, 1.0, 0.5]))
-        {
-            assert!((found - wanted).abs() < 0.01, "{warm:?}");
-            assert!((used - 0.7726 - 0.2274 * wanted).abs() < 0.01, "{warm:?}");
+        for (found, (used, wanted)) in kept.iter().zip(used.iter().zip([1.5, 1.0, 0.5])) {
+            assert!((found - wanted).abs() < 0.01, "{kept:?}");
+            assert!((used - 0.7726 - 0.2274 * wanted).abs() < 0.01, "{used}");
         }
-        let kept = of(&dusk(), "white_balance = \"light\"").estimated.unwrap();
-        assert_eq!(kept.found, kept.used);
         let grey = Rgb::new(dusk().into_planes().map(|_| 0.4));
         let [plain, kept] = ["", "white_balance = \"light\""].map(|more| of(&grey, more));
         let sides = [plain.light, kept.light].map(|light| light.light().unwrap());
@@ -387,7 +370,7 @@ mod tests {
         let background = dusk();
         let background = SceneBackground::Picture(&background);
         let given = SceneEnvironment::new(&described(""), background, Some(lamp)).unwrap();
-        assert_eq!(given.estimated, None);
+        assert!(!given.is_estimated);
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub use placement::Placement;
 pub(crate) use placement::{Fit, rows};
 pub use relightable_object::RelightableObject;
 pub use sequence::{Backdrop, RelightingSequence};
-pub use source::{LightSource, exposure_between, likeness};
+pub use source::{LightSource, exposure_between};
 pub use sun::SeenSun;
 pub use view::PanoramaView;
 pub use white_balance::WhiteBalance;

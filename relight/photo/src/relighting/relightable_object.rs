@@ -259,15 +259,6 @@ impl RelightableObject {
         self.relit_by(light, change, least)
     }
 
-    /// The part of the change of brightness from place to place, as a logarithm, that [`RelightableObject::relit`] withholds in a
-    /// light because the decomposition is uncertain, 0 to 1.
-    pub fn withheld(&self, light: &ShLight) -> f32 {
-        let kept = likeness(&self.light, light) as f32;
-        let irradiance = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&self.normals);
-        let least = LeastKept::in_light(directedness(light));
-        self.shading.withheld(irradiance.planes(), kept, least)
-    }
-
     fn relit_by(
         &self,
         light: &ShLight,

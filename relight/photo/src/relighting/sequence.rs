@@ -77,12 +77,6 @@ impl<'a> RelightingSequence<'a> {
         })
     }
 
-    /// The part of the change in shading that is withheld because the decomposition is uncertain, after the light has turned:
-    /// [`RelightableObject::withheld`].
-    pub fn withheld(&self, turn: f64) -> f32 {
-        self.relightable.withheld(&self.turned(turn))
-    }
-
     fn turned(&self, turn: f64) -> ShLight {
         // Not even rounding is to change light that does not turn.
         if turn == 0.0 {

@@ -196,26 +196,6 @@ impl Shading {
         let kept_beside = kept_beside[at].max(least.beside);
         ((least.of_mean - 1.0) * mean_change + (kept_beside - 1.0) * beside).exp()
     }
-
-    /// The part of the change beside the mean that the damping withholds in new irradiance, 0 to 1.
-    pub(crate) fn withheld(&self, irradiance: &Planes<3>, kept: f32, least: LeastKept) -> f32 {
-        let Some(Doubt {
-            sample,
-            kept_beside,
-        }) = &self.doubt
-        else {
-            return 0.0;
-        };
-        let mean_change = self.mean_change(irradiance, kept);
-        let (mut all, mut withheld) = (0.0_f32, 0.0_f32);
-        for &at in sample {
-            let irradiance = std::array::from_fn(|channel| irradiance.plane(channel)[at]);
-            let beside = (self.change(at, self.at(at, irradiance, kept)) - mean_change).abs();
-            all += beside;
-            withheld += (1.0 - kept_beside[at].max(least.beside)) * beside;
-        }
-        if all > 0.0 { withheld / all } else { 0.0 }
-    }
 }
 
 /// The pixels that are `wanted`, or [`MEAN_PIXELS`] of them.
@@ -292,18 +272,13 @@ mod tests {
     }
 
     #[test]
-    fn of_a_lamp_no_more_than_a_third_is_withheld_anywhere() {
+    fn of_a_lamp_less_is_withheld_and_of_the_mean_nothing_where_it_is_to_be_kept() {
         let shading = half_dark();
         let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
-        let withheld = |least| shading.withheld(&new, 0.0, least);
-        let (room, lamp) = (
-            withheld(LeastKept::in_light(0.0)),
-            withheld(LeastKept::in_light(1.0)),
-        );
-        assert!(room > 0.4 && lamp < 1.0 / 3.0, "{room} {lamp}");
         let mean_change = shading.mean_change(&new, 0.0);
         let shades = shading.at(DARK_PLACE, [1.0; 3], 0.0);
         let damping = |least| shading.damping(DARK_PLACE, shades, mean_change, least);
+        assert!(damping(LeastKept::in_light(1.0)) > damping(LeastKept::in_light(0.0)));
         let whole = damping(LeastKept::in_light(1.0).with_mean());
         assert!(whole > damping(LeastKept::in_light(1.0)));
         assert!(

@@ -4,8 +4,7 @@ mod arguments;
 
 use std::path::{Path, PathBuf};
 
-use relight_core::image::{ColourSpace, Srgb};
-use relight_photo::compositing::{EstimatedColours, SceneObject};
+use relight_photo::compositing::SceneObject;
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion, OutputKind};
 use relight_photo::relighting::{PanoramaExposure, SeenSun};
 use relit_console::{Console, Outcome, ProgressBar};
@@ -73,47 +72,29 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             output.display(),
             scene.objects.len(),
             environment.exposure.map(described).unwrap_or_default(),
-            environment.estimated.map_or_else(String::new, |colours| {
-                colours_described(colours) + &sun_described(environment.sun)
-            })
+            if environment.is_estimated {
+                sun_described(environment.sun)
+            } else {
+                String::new()
+            }
         ),
         &json!({
             "event": "inserted", "output": output, "objects": scene.objects.len(), "frames": frames,
             "tilt": environment.tilt, "level": harmonisation.level, "balance": harmonisation.balance, "grain": harmonisation.grain,
-            "exposure": environment.exposure, "sun": environment.sun, "light_colour": environment.estimated,
+            "exposure": environment.exposure, "sun": environment.sun,
         }),
     );
     Ok(Outcome::Success)
-}
-
-/// The colours of light that was estimated from a photograph, in words.
-fn colours_described(colours: EstimatedColours) -> String {
-    let EstimatedColours { found, used } = colours;
-    format!(
-        "; light estimated from the picture, {}, shown as {}",
-        hexadecimal(found),
-        hexadecimal(used)
-    )
-}
-
-/// A colour as it is in sRGB, its brightest channel full.
-fn hexadecimal(colour: [f64; 3]) -> String {
-    let brightest = colour.into_iter().fold(f64::MIN_POSITIVE, f64::max);
-    let levels = colour.map(|channel| {
-        let level = Srgb::from_linear((channel / brightest) as f32);
-        format!("{:02x}", (level.clamp(0.0, 1.0) * 255.0).round() as u8)
-    });
-    format!("#{}", levels.concat())
 }
 
 /// The sun that is seen in a photograph, in words.
 fn sun_described(sun: Option<SeenSun>) -> String {
     match sun {
         Some(sun) => format!(
-            "; sun found in the picture (confidence {:.1})",
+            "; light estimated from the picture, sun found in it (confidence {:.1})",
             sun.confidence
         ),
-        None => "; no sun found in the picture, so shadows are soft: --lamp AZIMUTH,ELEVATION,2 makes them hard"
+        None => "; light estimated from the picture, no sun found in it, so shadows are soft: --lamp AZIMUTH,ELEVATION,2 makes them hard"
             .to_owned(),
     }
 }
