@@ -5,7 +5,7 @@ use super::crop::{CropSquare, Window, cut_out, inside};
 use super::error::DecomposeError;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
-use super::network_output::{MapNetwork, NetworkEngine, PhotoPrediction, Scales, to_maps};
+use super::network_output::{MapNetwork, PhotoPrediction, Scales, to_maps};
 use super::tiled_compose::{LayerPlan, MapUpscaler};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
@@ -143,10 +143,10 @@ impl Decomposer {
     /// If the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
         let graph = decomposer_of(weights);
-        let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapNetwork>, NetError> {
+        let net = |weights: &Weights, side: usize| -> Result<MapNetwork, NetError> {
             let graph = decomposer_of(weights);
             let inference = Inference::new(&graph, weights, (side, side))?;
-            Ok(Box::new(NetworkEngine { inference, side }))
+            Ok(MapNetwork::new(inference, side))
         };
         let has_coarse = side.is_multiple_of(2 * graph.multiple());
         let coarse = || has_coarse.then(|| net(weights, side / 2)).transpose();
@@ -166,10 +166,7 @@ impl Decomposer {
         })
     }
 
-    pub(super) fn from_nets(
-        fine: Box<dyn MapNetwork>,
-        coarse: Option<Box<dyn MapNetwork>>,
-    ) -> Self {
+    pub(super) fn from_nets(fine: MapNetwork, coarse: Option<MapNetwork>) -> Self {
         Self {
             scales: Scales { fine, coarse },
             tells_paint: false,
@@ -178,7 +175,7 @@ impl Decomposer {
 
     /// Width and height of what the network sees, pixels.
     pub fn side(&self) -> usize {
-        self.scales.fine.side()
+        self.scales.fine.side
     }
 
     /// Decomposes a picture under a mask, which is the object where it is at least one half. Values
@@ -225,27 +222,26 @@ impl Decomposer {
             picture: &picture,
             inside: &inside,
             window,
-            photograph: extent,
-            with_highlight: is_glossy,
-            with_paint: options.paint && self.tells_paint,
         };
-        let layers = plan.compose(&maps)?;
-        Ok(Decomposition {
-            normals: layers.normals,
-            albedo: Rgb::new(layers.albedo),
-            shading: layers.shading,
-            diffuse: Rgb::new(layers.diffuse),
-            highlight: layers.highlight,
-            paint: layers.paint,
+        let with_paint = options.paint && self.tells_paint;
+        let mut found = Decomposition {
+            normals: Normals::new(Planes::zeros(Extent::new(0, 0))),
+            albedo: Rgb::new(Planes::zeros(extent)),
+            shading: Planes::zeros(extent),
+            diffuse: Rgb::new(Planes::zeros(extent)),
+            highlight: Planes::zeros(extent),
+            paint: with_paint.then(|| Planes::zeros(extent)),
             light: fitted.light,
             shading_light: fitted.shading_light,
             gloss: fitted.gloss,
             region,
             is_glossy,
             saturated_fraction,
-            residual: layers.residual,
+            residual: 0.0,
             light_residual: fitted.light_residual,
-        })
+        };
+        plan.compose(&maps, &mut found)?;
+        Ok(found)
     }
 }
 

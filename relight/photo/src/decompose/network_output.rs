@@ -11,10 +11,13 @@ use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
 
 /// A network that predicts the maps of a picture of `side` x `side` pixels.
-pub(super) trait MapNetwork: Send + Sync {
-    fn side(&self) -> usize;
-    fn predict(&self, encoded: &[f32]) -> Result<NetworkOutput, NetError>;
+pub(super) struct MapNetwork {
+    pub(super) side: usize,
+    pub(super) predict: Box<Predict>,
 }
+
+/// From an encoded picture to its maps.
+pub(super) type Predict = dyn Fn(&[f32]) -> Result<NetworkOutput, NetError> + Send + Sync;
 
 /// The output of a network.
 pub(super) struct NetworkOutput {
@@ -24,32 +27,26 @@ pub(super) struct NetworkOutput {
     pub(super) light: Option<PredictedLight>,
 }
 
-/// A network in the inference engine.
-pub(super) struct NetworkEngine {
-    pub(super) inference: Inference,
-    pub(super) side: usize,
-}
-
-impl MapNetwork for NetworkEngine {
-    fn side(&self) -> usize {
-        self.side
-    }
-
-    fn predict(&self, encoded: &[f32]) -> Result<NetworkOutput, NetError> {
-        let outputs = self.inference.run(encoded)?;
-        let mut prediction = NetworkOutput {
-            maps: Vec::new(),
-            light: None,
-        };
-        for output in outputs {
-            // The heads for pixels have four sides, that for light two.
-            if output.shape().len() > 2 {
-                prediction.maps.append(&mut output.into_values());
-            } else {
-                prediction.light = PredictedLight::from_output(output.values());
+impl MapNetwork {
+    /// A network in the inference engine.
+    pub(super) fn new(inference: Inference, side: usize) -> Self {
+        let predict = move |encoded: &[f32]| {
+            let mut prediction = NetworkOutput {
+                maps: Vec::new(),
+                light: None,
+            };
+            for output in inference.run(encoded)? {
+                // The heads for pixels have four sides, that for light two.
+                if output.shape().len() > 2 {
+                    prediction.maps.append(&mut output.into_values());
+                } else {
+                    prediction.light = PredictedLight::from_output(output.values());
+                }
             }
-        }
-        Ok(prediction)
+            Ok(prediction)
+        };
+        let predict = Box::new(predict);
+        Self { side, predict }
     }
 }
 
@@ -66,9 +63,9 @@ pub(super) struct Prediction {
 /// The network for pictures of two sizes. An object that fills a smaller picture is nearer to those that it was trained on,
 /// and is seen as a whole; the larger picture shows what is finer.
 pub(super) struct Scales {
-    pub(super) fine: Box<dyn MapNetwork>,
+    pub(super) fine: MapNetwork,
     /// For pictures of half the width and height.
-    pub(super) coarse: Option<Box<dyn MapNetwork>>,
+    pub(super) coarse: Option<MapNetwork>,
 }
 
 /// The planes of fields that are normals.
@@ -85,7 +82,7 @@ const DARKEST: f32 = 1e-4;
 
 /// The prediction for a picture of the network's size; with `mirror`, averaged with the prediction for its mirror image.
 pub(super) fn predict(
-    net: &dyn MapNetwork,
+    net: &MapNetwork,
     picture: &Planes<3>,
     mask: &Planes<1>,
     mirror: bool,
@@ -105,12 +102,12 @@ pub(super) fn predict(
 }
 
 fn predict_once(
-    net: &dyn MapNetwork,
+    net: &MapNetwork,
     picture: &Planes<3>,
     mask: &Planes<1>,
 ) -> Result<Prediction, NetError> {
     let encoded = NetworkInput::new(picture, mask);
-    let output = net.predict(encoded.values())?;
+    let output = (net.predict)(encoded.values())?;
     Ok(Prediction {
         fields: of_maps(encoded.decode(&output.maps)),
         light: output.light,
@@ -223,8 +220,8 @@ impl PhotoPrediction {
         part: &Part,
         mirror: bool,
     ) -> Result<Self, NetError> {
-        let at_scale = |net: &dyn MapNetwork, mirror| {
-            let extent = Extent::new(net.side(), net.side());
+        let at_scale = |net: &MapNetwork, mirror| {
+            let extent = Extent::new(net.side, net.side);
             let (picture, mask) = downscaled(picture, mask, part, extent);
             let Prediction { fields, light } = predict(net, &picture, &mask, mirror)?;
             Ok::<_, NetError>(Self {
@@ -235,11 +232,11 @@ impl PhotoPrediction {
             })
         };
         let Some(coarse) = &scales.coarse else {
-            return at_scale(scales.fine.as_ref(), mirror);
+            return at_scale(&scales.fine, mirror);
         };
         let (fine, coarse) = parallel::join(
-            || at_scale(scales.fine.as_ref(), false),
-            || at_scale(coarse.as_ref(), mirror),
+            || at_scale(&scales.fine, false),
+            || at_scale(coarse, mirror),
         );
         Ok(fine?.with_shape_of(&coarse?))
     }

@@ -2,38 +2,29 @@
 
 use super::network_output::{MapNetwork, NetworkOutput, predict, to_maps};
 use super::*;
-use crate::nets::{
-    INPUTS, LIGHT_PARAMETERS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads,
-};
+use crate::nets::{INPUTS, LIGHT_PARAMETERS, OUTPUTS, Weights, decomposer, decomposer_with_heads};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, YUp};
 
 /// Answers pixel by pixel, from the encoded values of the pixel.
-struct PixelNet<F> {
+fn pixel_net(
     side: usize,
-    pixel: F,
-}
-
-impl<F: Fn([f32; INPUTS]) -> [f32; OUTPUTS] + Send + Sync> MapNetwork for PixelNet<F> {
-    fn side(&self) -> usize {
-        self.side
-    }
-
-    fn predict(&self, encoded: &[f32]) -> Result<NetworkOutput, NetError> {
-        let pixels = self.side * self.side;
+    pixel: impl Fn([f32; INPUTS]) -> [f32; OUTPUTS] + Send + Sync + 'static,
+) -> MapNetwork {
+    let predict = move |encoded: &[f32]| {
+        let pixels = side * side;
         assert_eq!(encoded.len(), INPUTS * pixels);
-        let mut output = vec![0.0; OUTPUTS * pixels];
+        let mut maps = vec![0.0; OUTPUTS * pixels];
         for at in 0..pixels {
             let input = std::array::from_fn(|channel| encoded[channel * pixels + at]);
-            for (channel, value) in (self.pixel)(input).into_iter().enumerate() {
-                output[channel * pixels + at] = value;
+            for (channel, value) in pixel(input).into_iter().enumerate() {
+                maps[channel * pixels + at] = value;
             }
         }
-        Ok(NetworkOutput {
-            maps: output,
-            light: None,
-        })
-    }
+        Ok(NetworkOutput { maps, light: None })
+    };
+    let predict = Box::new(predict);
+    MapNetwork { side, predict }
 }
 
 /// Normals that lean by the colour, the albedo is the colour, the shading the luminance.
@@ -135,16 +126,8 @@ fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
         [0.5 + stripe, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, stripe, -50.0]
     };
     let leaning = |_: [f32; INPUTS]| [-0.5, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -50.0];
-    let fine = || {
-        Box::new(PixelNet {
-            side: 64,
-            pixel: striped,
-        })
-    };
-    let coarse = PixelNet {
-        side: 32,
-        pixel: leaning,
-    };
+    let fine = || pixel_net(64, striped);
+    let coarse = pixel_net(32, leaning);
     let lines = Planes::from_fn(extent, |x, y| {
         let light = if (x / 2) % 2 == 0 { 0.9 } else { 0.05 };
         [light, light, light + picture.pixel(x, y)[0] * 0.01]
@@ -155,7 +138,7 @@ fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
         ..DecomposeOptions::default()
     };
     let one = Decomposer::from_nets(fine(), None);
-    let both = Decomposer::from_nets(fine(), Some(Box::new(coarse)));
+    let both = Decomposer::from_nets(fine(), Some(coarse));
     let normals = |net: &Decomposer| net.decompose(&lines, &mask, &options).unwrap().normals;
     let (one, both) = (normals(&one), normals(&both));
     let mean_x = |of: &Normals<YUp>| {
@@ -180,13 +163,10 @@ fn the_gate_opens_where_more_than_five_percent_are_saturated() {
     let extent = Extent::new(40, 40);
     let mask = Planes::filled(extent, [1.0]);
     let net = Decomposer::from_nets(
-        Box::new(PixelNet {
-            side: 32,
-            pixel: |input: [f32; INPUTS]| {
-                let mut output = by_colour(input);
-                output[6] = 9.0;
-                output
-            },
+        pixel_net(32, |input| {
+            let mut output = by_colour(input);
+            output[6] = 9.0;
+            output
         }),
         None,
     );
@@ -247,16 +227,13 @@ fn what_lies_behind_the_object_does_not_matter() {
 #[test]
 fn fields_and_maps_are_the_same_but_for_the_mask() {
     let extent = Extent::new(32, 32);
-    let net = PixelNet {
-        side: 32,
-        pixel: by_colour,
-    };
+    let net = pixel_net(32, by_colour);
     let mask = disc(extent, 12.0);
     let found = predict(&net, &smooth(extent), &mask, false).unwrap().fields;
     let inside: Vec<bool> = mask.plane(0).iter().map(|&m| m > 0.5).collect();
     let maps = to_maps(found, &inside).unwrap();
     let encoded = NetworkInput::new(&smooth(extent), &mask);
-    let decoded = encoded.decode(&net.predict(encoded.values()).unwrap().maps);
+    let decoded = encoded.decode(&(net.predict)(encoded.values()).unwrap().maps);
     assert!(most_apart(maps.shading.plane(0), decoded.shading.plane(0)) < 1e-5);
     assert!(most_apart(maps.albedo.plane(2), decoded.albedo.plane(2)) < 1e-5);
     let [a, b] = [maps.normals, decoded.normals].map(|n| n.planes().plane(0).to_vec());
@@ -265,13 +242,7 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
 
 #[test]
 fn a_square_that_is_far_larger_than_the_photograph_takes_no_memory() {
-    let net = Decomposer::from_nets(
-        Box::new(PixelNet {
-            side: 32,
-            pixel: by_colour,
-        }),
-        None,
-    );
+    let net = Decomposer::from_nets(pixel_net(32, by_colour), None);
     let extent = Extent::new(8400, 1);
     let picture = Rgb::new(Planes::filled(extent, [0.5; 3]));
     let mask = Planes::filled(extent, [1.0]);
@@ -285,13 +256,7 @@ fn a_square_that_is_far_larger_than_the_photograph_takes_no_memory() {
 #[test]
 fn a_mask_that_is_empty_or_of_another_size_is_refused() {
     let extent = Extent::new(64, 64);
-    let net = Decomposer::from_nets(
-        Box::new(PixelNet {
-            side: 32,
-            pixel: by_colour,
-        }),
-        None,
-    );
+    let net = Decomposer::from_nets(pixel_net(32, by_colour), None);
     let picture = Rgb::new(smooth(extent));
     let decompose = |mask: Planes<1>| {
         let found = net.decompose(&picture, &mask, &DecomposeOptions::default());

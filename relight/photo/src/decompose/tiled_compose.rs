@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::compose::{ComposedLayers, LayerSums, ResidualSums, possible_highlight};
 use super::crop::{Window, inside};
+use super::decomposer::Decomposition;
 use super::encoding::PredictedMaps;
 use super::network_output::{Fields, to_maps};
 use relight_core::image::{Extent, ImageError, Part, Planes};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relight_core::parallel;
 
 /// Rows of a strip.
@@ -32,14 +33,9 @@ impl MapUpscaler {
         }
     }
 
-    /// The maps of some rows, 0 outside the mask.
+    /// The maps of some rows, 0 outside the mask. Of the fields only the rows that they are made of are looked at.
     fn maps(&self, rows: &Range<usize>, mask: &[bool]) -> Result<PredictedMaps, ImageError> {
-        to_maps(self.rows_of(&self.fields, rows), mask)
-    }
-
-    /// Rows of an image in the other size. Of the image only the rows that they are made of are looked at.
-    fn rows_of<const C: usize>(&self, image: &Planes<C>, rows: &Range<usize>) -> Planes<C> {
-        let (small, whole) = (image.extent(), self.part.whole);
+        let (small, whole) = (self.fields.extent(), self.part.whole);
         let target = Part {
             whole,
             at: [self.part.at[0], self.part.at[1] + rows.start as i64],
@@ -55,7 +51,8 @@ impl MapUpscaler {
             at: [0, first as i64],
             extent: Extent::new(small.width, behind - first),
         };
-        cut_rows(image, first..behind).resized_part(&source, &target)
+        let fields = cut_rows(&self.fields, first..behind).resized_part(&source, &target);
+        to_maps(fields, mask)
     }
 }
 
@@ -64,80 +61,62 @@ fn cut_rows<const C: usize>(image: &Planes<C>, rows: Range<usize>) -> Planes<C> 
     image.cut([0, rows.start], extent)
 }
 
-/// The layers of a photograph, as large as it is.
-pub(super) struct FullLayers {
-    pub(super) normals: Normals<YUp>,
-    pub(super) albedo: Planes<3>,
-    pub(super) shading: Planes<1>,
-    pub(super) highlight: Planes<1>,
-    pub(super) diffuse: Planes<3>,
-    pub(super) paint: Option<Planes<1>>,
-    pub(super) residual: f64,
-}
-
 /// What layers are made for.
 pub(super) struct LayerPlan<'a> {
     /// The object's pixels, 0 outside the mask.
     pub(super) picture: &'a Planes<3>,
     pub(super) inside: &'a [bool],
-    /// Where in the photograph these pixels are, and how large that is.
+    /// Where in the photograph these pixels are.
     pub(super) window: Window,
-    pub(super) photograph: Extent,
-    pub(super) with_highlight: bool,
-    pub(super) with_paint: bool,
 }
 
 impl LayerPlan<'_> {
-    /// Composes all strips: once for what is known of the whole picture only, and once more for the layers.
-    pub(super) fn compose(&self, maps: &MapUpscaler) -> Result<FullLayers, ImageError> {
+    /// Composes all strips: once for what is known of the whole picture only, and once more for the layers, which are put
+    /// into black ones of the photograph's size.
+    pub(super) fn compose(
+        &self,
+        maps: &MapUpscaler,
+        found: &mut Decomposition,
+    ) -> Result<(), ImageError> {
         let height = self.picture.extent().height;
         let strips: Vec<Range<usize>> = (0..height)
             .step_by(ROWS)
             .map(|first| first..(first + ROWS).min(height))
             .collect();
         let sums = parallel::map(strips.len(), |at| {
-            let (picture, mask, maps) = self.strip(maps, &strips[at])?;
+            let (picture, mask, maps) = self.strip(maps, &strips[at], found.is_glossy)?;
             Ok::<_, ImageError>(LayerSums::from_maps(&picture, mask, &maps))
         });
         let mut all = LayerSums::default();
         for sums in sums {
             all = all.and(sums?);
         }
-        let mut full = FullLayers {
-            normals: Normals::new(Planes::zeros(Extent::new(0, 0))),
-            albedo: Planes::zeros(self.photograph),
-            shading: Planes::zeros(self.photograph),
-            highlight: Planes::zeros(self.photograph),
-            diffuse: Planes::zeros(self.photograph),
-            paint: self.with_paint.then(|| Planes::zeros(self.photograph)),
-            residual: 0.0,
-        };
-        let mut normals = Planes::zeros(self.photograph);
+        let mut normals = Planes::zeros(found.shading.extent());
         let mut residual = ResidualSums::default();
         // As many at once as there are threads: each waits in memory until it is put in its place.
         for some in strips.chunks(parallel::threads().max(1)) {
             let layers = parallel::map(some.len(), |at| {
-                let (picture, mask, maps) = self.strip(maps, &some[at])?;
+                let (picture, mask, maps) = self.strip(maps, &some[at], found.is_glossy)?;
                 Ok::<_, ImageError>(ComposedLayers::new(picture, mask, maps, &all))
             });
             for (rows, layers) in some.iter().zip(layers) {
                 let layers = layers?;
                 residual = residual.and(layers.residual);
                 self.put(layers.normals.planes(), rows.start, &mut normals);
-                self.put(&layers.albedo, rows.start, &mut full.albedo);
-                self.put(&layers.shading, rows.start, &mut full.shading);
-                self.put(&layers.diffuse, rows.start, &mut full.diffuse);
-                if self.with_highlight {
-                    self.put(&layers.highlight, rows.start, &mut full.highlight);
+                self.put(&layers.albedo, rows.start, found.albedo.planes_mut());
+                self.put(&layers.shading, rows.start, &mut found.shading);
+                self.put(&layers.diffuse, rows.start, found.diffuse.planes_mut());
+                if found.is_glossy {
+                    self.put(&layers.highlight, rows.start, &mut found.highlight);
                 }
-                if let Some(paint) = &mut full.paint {
+                if let Some(paint) = &mut found.paint {
                     self.put(&layers.paint, rows.start, paint);
                 }
             }
         }
-        full.normals = Normals::new(normals);
-        full.residual = residual.relative();
-        Ok(full)
+        found.normals = Normals::new(normals);
+        found.residual = residual.relative();
+        Ok(())
     }
 
     /// Picture, mask and maps of some rows.
@@ -145,12 +124,13 @@ impl LayerPlan<'_> {
         &self,
         maps: &MapUpscaler,
         rows: &Range<usize>,
+        is_glossy: bool,
     ) -> Result<(Planes<3>, &[bool], PredictedMaps), ImageError> {
         let width = self.picture.extent().width;
         let mask = &self.inside[rows.start * width..rows.end * width];
         let picture = cut_rows(self.picture, rows.clone());
         let mut maps = maps.maps(rows, mask)?;
-        maps.highlight = if self.with_highlight {
+        maps.highlight = if is_glossy {
             possible_highlight(&picture, mask, maps.highlight)
         } else {
             Planes::zeros(picture.extent())
@@ -160,7 +140,7 @@ impl LayerPlan<'_> {
 
     /// Puts a strip where it belongs in the photograph.
     fn put<const C: usize>(&self, strip: &Planes<C>, first: usize, to: &mut Planes<C>) {
-        let (width, whole) = (strip.extent().width, self.photograph.width);
+        let (width, whole) = (strip.extent().width, to.extent().width);
         let [x, y] = self.window.at;
         for (to, from) in to.planes_mut().into_iter().zip(strip.planes()) {
             for (row, from) in from.chunks_exact(width).enumerate() {

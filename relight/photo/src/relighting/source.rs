@@ -73,7 +73,7 @@ pub fn exposure_between(old: &ShLight, new: &ShLight) -> f32 {
 /// colour, 0 for opposite ones. It is the part of the shadows in the one that hold in the other.
 ///
 /// With a and b the irradiance of bands 1 and 2, each over that of band 0, it is `1 - |a - b| / (|a| + |b|)`.
-pub fn likeness(old: &ShLight, new: &ShLight) -> f64 {
+pub(super) fn likeness(old: &ShLight, new: &ShLight) -> f64 {
     let [a, b] = [old, new].map(directed);
     let length = |v: [f64; 8]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
     let apart = length([0, 1, 2, 3, 4, 5, 6, 7].map(|k| a[k] - b[k]));
