@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use relight_photo::nets::paper::{self, Head};
+use relight_photo::nets::paper;
 use relight_photo::nets::{Graph, Inference, Tensor, Weights, decomposer};
 
 const SIDE: usize = 128;
@@ -87,7 +87,7 @@ fn answers_as_pytorch(graph: &Graph) {
 fn the_papers_networks_answer_as_in_pytorch() {
     answers_as_pytorch(&paper::spec_net());
     answers_as_pytorch(&paper::normal_net());
-    answers_as_pytorch(&paper::light_net(Head::Pooled));
+    answers_as_pytorch(&paper::light_net());
 }
 
 #[test]

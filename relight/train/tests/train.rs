@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use relight_core::image::{Extent, Planes};
 use relight_photo::decompose::NetworkInput;
-use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+use relight_photo::nets::paper::{light_net, normal_net, spec_net};
 use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
 use relight_synth::{Folders, Library, Recipe, SequenceRecipe, write_sequences};
 use relight_train::{
@@ -39,11 +39,7 @@ fn model(graph: Graph, precision: ComputePrecision) -> Model {
 
 #[test]
 fn what_is_trained_answers_as_what_is_shipped() {
-    for graph in [
-        decomposer_with_heads(),
-        normal_net(),
-        light_net(Head::Pooled),
-    ] {
+    for graph in [decomposer_with_heads(), normal_net(), light_net()] {
         let weights = Weights::initial(&graph, 3);
         let picture = input(graph.input_channels());
         let flat = Vec::<f32>::try_from(picture.flatten(0, -1)).unwrap();
@@ -97,13 +93,13 @@ fn steps_lower_the_loss_in_both_precisions() {
 #[test]
 fn a_run_that_was_saved_goes_on_to_the_same_losses() {
     tch::set_num_threads(1);
-    let first = model(light_net(Head::Pooled), ComputePrecision::Single);
+    let first = model(light_net(), ComputePrecision::Single);
     let mut adam = Adam::new(&RunSettings::default(), first.parameters()).unwrap();
     descend(&first, &mut adam, 3);
     let (weights, memory) = (first.weights().unwrap(), adam.memory().unwrap());
     let undisturbed = descend(&first, &mut adam, 3);
 
-    let graph = light_net(Head::Pooled);
+    let graph = light_net();
     let second = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
     let mut adam = Adam::new(&RunSettings::default(), second.parameters()).unwrap();
     adam.load_state(&memory).unwrap();
@@ -112,7 +108,7 @@ fn a_run_that_was_saved_goes_on_to_the_same_losses() {
 
 #[test]
 fn the_memory_of_another_network_is_refused() {
-    let light = model(light_net(Head::Pooled), ComputePrecision::Single);
+    let light = model(light_net(), ComputePrecision::Single);
     let memory = Adam::new(&RunSettings::default(), light.parameters())
         .unwrap()
         .memory()
@@ -382,7 +378,7 @@ fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
         turns: Some(turns.path().to_owned()),
         spec: Some(Weights::initial(&spec_net(), 1)),
         normal: Some(Weights::initial(&normal_net(), 2)),
-        light: Some(Weights::initial(&light_net(Head::Pooled), 3)),
+        light: Some(Weights::initial(&light_net(), 3)),
         ..PaperInputs::default()
     };
     for phase in [
@@ -522,7 +518,7 @@ impl EverySecondStep {
             ema_decay: 0.9,
             ..RunSettings::default()
         };
-        let graph = light_net(Head::Pooled);
+        let graph = light_net();
         let weights = Weights::initial(&graph, 5);
         Self {
             trainable: Trainable::new(graph, Some(&weights), &run, Device::Cpu).unwrap(),

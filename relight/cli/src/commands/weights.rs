@@ -1,10 +1,10 @@
-//! `relight weights`: weights of networks from one format into another.
+//! `relight weights`: weights of networks into ONNX.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
-use relight_photo::nets::paper::{self, Head};
+use relight_photo::nets::paper;
 use relight_photo::nets::{
     Graph, NetError, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network,
 };
@@ -81,7 +81,7 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Check weights, and write them as safetensors or, with their network, as ONNX.
+    /// Check weights, and write them with their network as ONNX, in 16 bits.
     Export(Export),
 }
 
@@ -90,15 +90,12 @@ struct Export {
     /// The weights (.safetensors) [default: built in].
     #[arg(value_name = "IN")]
     input: Option<PathBuf>,
-    /// The file to write: .onnx or .safetensors.
+    /// The file to write: .onnx.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// The network of the weights.
     #[arg(long, value_enum, default_value_t = NetName::Decomposer)]
     net: NetName,
-    /// Write 32-bit numbers instead of 16-bit ones.
-    #[arg(long)]
-    single: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -113,12 +110,8 @@ enum NetName {
     NormalNet,
     /// The paper's Light-Net with a pooled head.
     LightNet,
-    /// The paper's Light-Net as released.
-    LightNetReleased,
-    /// The paper's net for reflectance and smoothness, pooled head.
+    /// The paper's net for reflectance and smoothness.
     ReflectanceNet,
-    /// The same with the released head.
-    ReflectanceNetReleased,
 }
 
 impl NetName {
@@ -138,10 +131,8 @@ impl NetName {
             Self::TurnNet => turn_network(),
             Self::SpecNet => paper::spec_net(),
             Self::NormalNet => paper::normal_net(),
-            Self::LightNet => paper::light_net(Head::Pooled),
-            Self::LightNetReleased => paper::light_net(Head::Released),
-            Self::ReflectanceNet => paper::reflectance_net(Head::Pooled),
-            Self::ReflectanceNetReleased => paper::reflectance_net(Head::Released),
+            Self::LightNet => paper::light_net(),
+            Self::ReflectanceNet => paper::reflectance_net(),
         }
     }
 }
@@ -154,8 +145,8 @@ impl Arguments {
             return Some("give the weights: the program contains none for this network".to_owned());
         }
         let output = export.output.display();
-        let is_known = has_extension(&export.output, &["onnx", "safetensors"]);
-        (!is_known).then(|| format!("--output {output}: give .onnx or .safetensors"))
+        let is_known = has_extension(&export.output, &["onnx"]);
+        (!is_known).then(|| format!("--output {output}: give .onnx"))
     }
 }
 
@@ -194,18 +185,9 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     if let Some(folder) = export.output.parent() {
         make_folder(folder)?;
     }
-    let precision = if export.single {
-        WeightPrecision::Single
-    } else {
-        WeightPrecision::Half
-    };
-    if has_extension(&export.output, &["onnx"]) {
-        let bytes = to_onnx(&graph, &weights, precision, &export.facts())?;
-        write_whole(&export.output, &bytes)
-            .map_err(|error| format!("{}: {error}", export.output.display()))?;
-    } else {
-        weights.write(&export.output, precision)?;
-    }
+    let bytes = to_onnx(&graph, &weights, WeightPrecision::Half, &export.facts())?;
+    write_whole(&export.output, &bytes)
+        .map_err(|error| format!("{}: {error}", export.output.display()))?;
     let count: usize = weights
         .iter()
         .map(|(_, tensor)| tensor.values().len())

@@ -98,7 +98,7 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
         ("decompose photos --mask w.safetensors -o o", 2, "--mask"),
         ("decompose photos/black.png --rect 1,2,3 -o o", 2, "X,Y,W,H"),
         ("decompose photos/black.png", 2, "--output"),
-        ("weights export w.safetensors -o w.txt", 2, ".safetensors"),
+        ("weights export w.safetensors -o w.txt", 2, ".onnx"),
         (
             "weights export w.safetensors --net normal-net -o w.onnx",
             1,

@@ -57,12 +57,12 @@ fn not_read(path: &Path) -> impl FnOnce(io::Error) -> NetError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nets::paper::{Head, light_net};
+    use crate::nets::paper::light_net;
     use crate::nets::weights::Tensor;
 
     #[test]
     fn a_file_gives_back_what_was_written() {
-        let graph = light_net(Head::Pooled);
+        let graph = light_net();
         let weights = Weights::initial(&graph, 3);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("light.safetensors");

@@ -99,11 +99,6 @@ pub enum Operation {
     MeanPool,
     /// Maximum over all pixels: a vector.
     MaxPool,
-    /// All numbers of a picture of the given size as one vector, channel by channel, row by row.
-    Flatten {
-        /// Width and height that the picture has to have, pixels.
-        side: usize,
-    },
     /// Fully connected layer. Parameters `<name>.weight` (`outputs x inputs`) and `<name>.bias`.
     Linear {
         /// Name of its parameters.
@@ -190,17 +185,6 @@ impl Graph {
     pub fn multiple(&self) -> usize {
         let scales = self.nodes.iter().filter_map(|node| node.scale);
         scales.max().unwrap_or(1)
-    }
-
-    /// The one width and height that an input may have, where the network has a layer that fixes it.
-    pub fn fixed_side(&self) -> Option<usize> {
-        self.nodes.iter().find_map(|node| match node.operation {
-            Operation::Flatten { side } => {
-                let scale = self.node(node.inputs[0]).scale.unwrap_or(1);
-                Some(side * scale)
-            }
-            _ => None,
-        })
     }
 
     /// Every parameter, in the order of the nodes.
@@ -362,12 +346,6 @@ impl Graph {
     pub fn max_pool(&mut self, of: Value) -> Value {
         let channels = self.node(of).channels;
         self.push(Operation::MaxPool, vec![of], channels, None)
-    }
-
-    /// A picture of `side x side` pixels as a vector.
-    pub fn flatten(&mut self, of: Value, side: usize) -> Value {
-        let channels = self.node(of).channels * side * side;
-        self.push(Operation::Flatten { side }, vec![of], channels, None)
     }
 
     /// A fully connected layer.

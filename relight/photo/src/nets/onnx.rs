@@ -53,11 +53,11 @@ pub fn to_onnx(
         let node = graph.node(output.value);
         let name = name_of(output.value.index());
         let identity = operator("Identity", vec![name], output.name.to_owned());
-        (identity, value_info(output.name, &sides(graph, node)))
+        (identity, value_info(output.name, &sides(node)))
     });
     let (identities, outputs): (Vec<_>, Vec<_>) = outputs.unzip();
     writer.nodes.extend(identities);
-    let input = sides(graph, &graph.nodes()[0]);
+    let input = sides(&graph.nodes()[0]);
     let fact = |&(key, value): &(&str, &str)| StringStringEntryProto {
         key: key.to_owned(),
         value: value.to_owned(),
@@ -91,29 +91,24 @@ pub fn to_onnx(
 pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), NetError> {
     let multiple = graph.multiple();
     let divides = width.is_multiple_of(multiple) && height.is_multiple_of(multiple);
-    let needs = match graph.fixed_side() {
-        Some(side) if (width, height) != (side, side) => format!("it needs {side} x {side}"),
-        _ if !divides || width.min(height) == 0 => {
-            format!("width and height have to be multiples of {multiple}")
-        }
-        _ => return Ok(()),
-    };
+    if divides && width.min(height) > 0 {
+        return Ok(());
+    }
     Err(NetError::Other(format!(
-        "{} cannot take a picture of {width} x {height} pixels: {needs}",
+        "{} cannot take a picture of {width} x {height} pixels: width and height have to be multiples of {multiple}",
         graph.name()
     )))
 }
 
 /// The sides of a node's value: how many, or the name of what may differ.
-fn sides(graph: &Graph, node: &Node) -> Vec<dimension::Value> {
+fn sides(node: &Node) -> Vec<dimension::Value> {
     let known = |side: usize| dimension::Value::DimValue(side as i64);
     let open = |name: &str| dimension::Value::DimParam(name.to_owned());
     let mut sides = vec![open("batch"), known(node.channels)];
     if let Some(scale) = node.scale {
-        sides.extend(["height", "width"].map(|name| match graph.fixed_side() {
-            Some(side) => known(side / scale),
-            None if scale == 1 => open(name),
-            None => open(&format!("{name}/{scale}")),
+        sides.extend(["height", "width"].map(|name| match scale {
+            1 => open(name),
+            _ => open(&format!("{name}/{scale}")),
         }));
     }
     sides
@@ -201,9 +196,6 @@ impl Writer {
             }
             Operation::MeanPool => self.write_pool("GlobalAveragePool", &inputs[0], &output),
             Operation::MaxPool => self.write_pool("GlobalMaxPool", &inputs[0], &output),
-            Operation::Flatten { .. } => {
-                self.push(plain("Flatten"), vec![integer("axis", 1)]);
-            }
             Operation::Linear { name } => {
                 let proto = with_parameters(plain("Gemm"), name);
                 self.push(proto, vec![integer("transB", 1)]);

@@ -5,8 +5,6 @@
 
 use super::graph::{Graph, Value};
 
-/// Width and height of a picture for which the released Light-Net's first layer is made.
-pub const RELEASED_SIDE: usize = 256;
 /// Coefficients and light colour that Light-Net predicts: 9 + 3.
 pub const LIGHT_OUTPUTS: usize = 12;
 /// What the reflectance net predicts: specular reflectance (red, green, blue) and smoothness.
@@ -20,16 +18,6 @@ const DECODER: [usize; 5] = [256, 128, 64, 32, 16];
 const MIDDLE: usize = 4;
 /// Width of the hidden layer of the light head.
 const HEAD_WIDTH: usize = 256;
-
-/// How Light-Net, and the reflectance net like it, get from features to numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Head {
-    /// Mean and maximum over the picture, then two small layers: 0.3 million parameters, any size.
-    Pooled,
-    /// As released: all 32,768 features into a layer of 4096, 138 million parameters, 256 x 256
-    /// pixels only.
-    Released,
-}
 
 /// Spec-Net: the highlight of a picture, before `(tanh + 1) / 2` becomes `[0, 1]`.
 ///
@@ -49,16 +37,17 @@ pub fn normal_net() -> Graph {
 
 /// Light-Net: nine coefficients of order-2 spherical harmonics, and the light's colour.
 ///
-/// Input as [`spec_net`]'s. Output `light`: a vector of [`LIGHT_OUTPUTS`].
-pub fn light_net(head: Head) -> Graph {
-    numbers_net("light-net", "light", LIGHT_OUTPUTS, head)
+/// Its head is not the released one, a layer of 138 million parameters for pictures of 256 x 256 pixels only, but takes mean and
+/// maximum over the picture. Input as [`spec_net`]'s. Output `light`: a vector of [`LIGHT_OUTPUTS`].
+pub fn light_net() -> Graph {
+    numbers_net("light-net", "light", LIGHT_OUTPUTS)
 }
 
 /// The net for specular reflectance s_p and smoothness alpha, with Light-Net's structure.
 ///
 /// Input as [`spec_net`]'s. Output `reflectance`: a vector of [`REFLECTANCE_OUTPUTS`].
-pub fn reflectance_net(head: Head) -> Graph {
-    numbers_net("reflectance-net", "reflectance", REFLECTANCE_OUTPUTS, head)
+pub fn reflectance_net() -> Graph {
+    numbers_net("reflectance-net", "reflectance", REFLECTANCE_OUTPUTS)
 }
 
 fn u_net(name: &'static str, output: &'static str, channels: usize) -> Graph {
@@ -79,28 +68,16 @@ fn u_net(name: &'static str, output: &'static str, channels: usize) -> Graph {
     net
 }
 
-fn numbers_net(name: &'static str, output: &'static str, numbers: usize, head: Head) -> Graph {
+fn numbers_net(name: &'static str, output: &'static str, numbers: usize) -> Graph {
     let (mut net, input) = Graph::new(name, 3);
     let features = encode(&mut net, input);
     let joined = join_middle(&mut net, &features);
-    let value = match head {
-        Head::Pooled => {
-            let mean = net.mean_pool(joined);
-            let most = net.max_pool(joined);
-            let pooled = net.concatenate(mean, most);
-            let hidden = net.linear("head.0".to_owned(), pooled, HEAD_WIDTH);
-            let hidden = net.relu(hidden);
-            net.linear("head.2".to_owned(), hidden, numbers)
-        }
-        Head::Released => {
-            let mut value = net.flatten(joined, RELEASED_SIDE / 32);
-            for (at, width) in [(0, 4096), (2, 1024)] {
-                value = net.linear(format!("L_SHcoeffs.{at}"), value, width);
-                value = net.relu(value);
-            }
-            net.linear("L_SHcoeffs.4".to_owned(), value, numbers)
-        }
-    };
+    let mean = net.mean_pool(joined);
+    let most = net.max_pool(joined);
+    let pooled = net.concatenate(mean, most);
+    let hidden = net.linear("head.0".to_owned(), pooled, HEAD_WIDTH);
+    let hidden = net.relu(hidden);
+    let value = net.linear("head.2".to_owned(), hidden, numbers);
     net.output(output, value);
     net
 }
@@ -140,12 +117,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_released_light_net_has_138_million_parameters_and_the_pooled_one_4() {
+    fn networks_are_as_large_as_the_papers() {
         let count = |net: Graph| net.parameters().iter().map(|p| p.count()).sum::<usize>();
-        let released = count(light_net(Head::Released));
-        assert!((138_000_000..144_000_000).contains(&released), "{released}");
-        assert!(count(light_net(Head::Pooled)) < 4_500_000);
+        assert!(count(light_net()) < 4_500_000);
         assert!((5_200_000..5_500_000).contains(&count(normal_net())));
+        assert_eq!(normal_net().multiple(), 32);
     }
 
     #[test]
@@ -163,12 +139,5 @@ mod tests {
         ] {
             assert!(names.iter().any(|known| known == name), "{name}");
         }
-    }
-
-    #[test]
-    fn the_released_head_fixes_the_size_and_the_pooled_does_not() {
-        assert_eq!(light_net(Head::Released).fixed_side(), Some(RELEASED_SIDE));
-        assert_eq!(light_net(Head::Pooled).fixed_side(), None);
-        assert_eq!(normal_net().multiple(), 32);
     }
 }

@@ -197,7 +197,6 @@ impl Model {
             Operation::PixelShuffle { factor } => of.f_pixel_shuffle(*factor as i64)?,
             Operation::MeanPool => of.f_mean_dim([2_i64, 3].as_slice(), false, None)?,
             Operation::MaxPool => of.f_amax([2_i64, 3], false)?,
-            Operation::Flatten { .. } => of.f_flatten(1, -1)?,
             Operation::Linear { name } => {
                 let (weight, bias) = self.layer(name)?;
                 of.f_linear(&weight, Some(&bias))?

@@ -18,7 +18,7 @@ use crate::engine::model::Model;
 use crate::engine::tensors::grey;
 use crate::error::TrainError;
 use crate::settings::{PaperPhase, PaperSettings};
-use relight_photo::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
+use relight_photo::nets::paper::{light_net, normal_net, reflectance_net, spec_net};
 use relight_photo::nets::{Graph, Weights};
 
 /// What a run of a phase is given.
@@ -86,7 +86,7 @@ impl PhaseNetworks {
             phase,
             spec: model("--spec-net", spec_net(), &inputs.spec)?,
             normal: model("--normal-net", normal_net(), &inputs.normal)?,
-            light: model("--light-net", light_net(Head::Pooled), &inputs.light)?,
+            light: model("--light-net", light_net(), &inputs.light)?,
         })
     }
 
@@ -203,7 +203,7 @@ pub(crate) fn trained_graph(phase: PaperPhase) -> Graph {
     match phase {
         PaperPhase::Spec => spec_net(),
         PaperPhase::Normal | PaperPhase::Joint => normal_net(),
-        PaperPhase::Light => light_net(Head::Pooled),
-        PaperPhase::Specular => reflectance_net(Head::Pooled),
+        PaperPhase::Light => light_net(),
+        PaperPhase::Specular => reflectance_net(),
     }
 }

@@ -262,7 +262,7 @@ pub(crate) fn specular_on_turns(
 mod tests {
     use super::*;
     use crate::settings::ComputePrecision;
-    use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+    use relight_photo::nets::paper::{light_net, normal_net, spec_net};
     use relight_photo::nets::{Graph, Weights};
     use tch::{Device, Kind};
 
@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn normal_net_and_light_net_are_given_the_picture_without_its_highlights() {
-        let (normal, light) = (model(normal_net(), 1), model(light_net(Head::Pooled), 2));
+        let (normal, light) = (model(normal_net(), 1), model(light_net(), 2));
         let spec = model(spec_net(), 3);
         let turns = frames(picture(), vec![true, false]);
         let found = reflectance(&normal, &light, Some(&spec), &turns).unwrap();
