@@ -36,7 +36,7 @@ enum Verb {
     /// Insert the objects of photographs into another picture, a panorama or a video.
     #[command(after_help = insert::EXAMPLES)]
     Insert(Box<insert::Arguments>),
-    /// Render an object from its maps: an image, a video, or a sheet of materials.
+    /// Render an object from its maps: an image or a video.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
     /// Score estimates and baselines by the protocols of the paper's tables.

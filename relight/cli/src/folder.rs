@@ -17,18 +17,3 @@ pub(crate) struct OutputFolder {
 pub(super) fn make_folder(path: &Path) -> Result<(), String> {
     fs::create_dir_all(path).map_err(|error| format!("{} cannot be made: {error}", path.display()))
 }
-
-/// The same, and nothing is in it.
-pub(super) fn make_empty_folder(path: &Path) -> Result<(), String> {
-    make_folder(path)?;
-    let entries = fs::read_dir(path);
-    let mut entries =
-        entries.map_err(|error| format!("{} cannot be read: {error}", path.display()))?;
-    match entries.next() {
-        None => Ok(()),
-        Some(_) => Err(format!(
-            "{} is not empty: give a new or empty folder",
-            path.display()
-        )),
-    }
-}

@@ -1,5 +1,5 @@
-//! Makes the pictures of the manual: the conventions, the specular layers beside the ground truth, a mug
-//! under turning light, and the mug in many materials. All that they show is made here.
+//! Makes the pictures of the manual: the conventions, the specular layers beside the ground truth, and a
+//! mug under turning light. All that they show is made here.
 //!
 //!     cargo run --release -p relight --example pictures -- docs/images
 
@@ -21,7 +21,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     save(conventions()?, &folder.join("relight-conventions.png"))?;
     save(highlights()?, &folder.join("relight-highlights.png"))?;
     save(turn()?, &folder.join("relight-turn.png"))?;
-    save(materials()?, &folder.join("relight-materials.png"))?;
     Ok(())
 }
 
@@ -103,18 +102,6 @@ fn turn() -> Result<Rgb<Linear>, Box<dyn Error>> {
         tiles.push(image.into_planes());
     }
     Ok(Rgb::new(Planes::sheet(&tiles, 4)?))
-}
-
-/// The mug in more and less reflecting and smooth materials.
-fn materials() -> Result<Rgb<Linear>, Box<dyn Error>> {
-    let light = studio(Extent::new(256, 128))?.project(Order::new(24)?);
-    let settings = settings(exposure_for(&light));
-    Ok(settings.sweep(
-        &mug(128)?,
-        &light,
-        &[0.04, 0.15, 0.4],
-        &[5.0, 10.0, 20.0, 50.0, 100.0, 200.0],
-    )?)
 }
 
 fn settings(exposure: f32) -> RenderSettings {

@@ -1,11 +1,11 @@
-//! More than one image of a surface: under turning light, in several materials; and how bright they are shown.
+//! Images of a surface under turning light, and how bright they are shown.
 
 use std::f64::consts::PI;
 
 use super::diffuse::{DiffuseForm, DiffuseLayer};
 use super::layers::{Layers, SpecularForm};
-use super::surface::{Gloss, Surface};
-use crate::image::{ImageError, Linear, Planes, Rgb};
+use super::surface::Surface;
+use crate::image::{ImageError, Linear, Rgb};
 use crate::light::{Direction, Rotation, ShLight};
 
 /// How a surface is rendered and shown.
@@ -44,31 +44,6 @@ impl RenderSettings {
         let turn = Rotation::about(Direction::UP, 2.0 * PI * part);
         self.image(surface, &light.rotated(&turn))
     }
-
-    /// One image of the surface in each material: a row for each part of the light that is reflected towards
-    /// the viewer at a right angle, in it a column for each smoothness. So a row reflects the same
-    /// amount of light, in smaller and brighter highlights: see [`mirror_reflectance`].
-    ///
-    /// # Errors
-    /// As [`RenderSettings::image`].
-    pub fn sweep(
-        &self,
-        surface: &Surface,
-        light: &ShLight,
-        parts: &[f32],
-        smoothnesses: &[f32],
-    ) -> Result<Rgb<Linear>, ImageError> {
-        let mut tiles = Vec::new();
-        for &part in parts {
-            for &smoothness in smoothnesses {
-                let reflectance = mirror_reflectance(part, smoothness);
-                let gloss = Gloss::even(surface.extent(), [reflectance; 3], smoothness);
-                let glossy = surface.clone().with_gloss(Some(gloss))?;
-                tiles.push(self.image(&glossy, light)?.into_planes());
-            }
-        }
-        Ok(Rgb::new(Planes::sheet(&tiles, smoothnesses.len())?))
-    }
 }
 
 /// The s_p with which a surface of smoothness α that faces the viewer reflects this part of even light:
@@ -99,8 +74,9 @@ pub fn exposure_for(light: &ShLight) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Extent;
+    use crate::image::Planes;
     use crate::light::{Normals, Order};
+    use crate::render::Gloss;
 
     const LOOK: RenderSettings = RenderSettings {
         diffuse: DiffuseForm::Irradiance,
@@ -145,20 +121,6 @@ mod tests {
             assert!((most - 1.0).abs() < 0.01, "{most}");
         }
         assert_eq!(exposure_for(&ShLight::dark(Order::TWO)), 1.0);
-    }
-
-    #[test]
-    fn a_sweep_has_a_tile_for_each_material() {
-        let (surface, light) = scene();
-        let sheet = LOOK
-            .sweep(&surface, &light, &[0.0, 0.5], &[5.0, 50.0, 200.0])
-            .unwrap();
-        assert_eq!(sheet.planes().extent(), Extent::new(93, 62));
-        let middle =
-            |column: usize, row: usize| sheet.planes().pixel(31 * column + 15, 31 * row + 15)[0];
-        assert!((middle(0, 0) - middle(2, 0)).abs() < 1e-5);
-        // Light from the viewer: the smoother, the more of it comes back from the middle.
-        assert!(middle(0, 1) < middle(1, 1) && middle(1, 1) < middle(2, 1));
     }
 
     #[test]

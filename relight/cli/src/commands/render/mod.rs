@@ -1,22 +1,20 @@
-//! `relight render`: from maps and light to an image, a video in which the light rotates, a sheet of materials.
+//! `relight render`: from maps and light to an image, or a video in which the light rotates.
 
 mod object;
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use rayon::prelude::*;
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 use relight_core::render::{RenderSettings, Surface, exposure_for};
-use relight_photo::files::{MovieWriter, OutputKind, write_picture};
+use relight_photo::files::{MovieFormat, MovieWriter, OutputKind, write_picture};
 use relight_photo::relighting::{InsertError, LightSource, exposure_for_object};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
 use self::object::{Map, ObjectArguments};
 use crate::commands::CommandResult;
-use crate::folder::make_empty_folder;
 use crate::lighting::{LightArguments, RotationArguments, ShadingArgument};
 use crate::values::within;
 
@@ -28,12 +26,7 @@ Examples:
       the same from maps, in the light of a lamp
   relight render image --normals normal.png --albedo albedo.png --reflectance 0.3 --smoothness 60 \\
       --light light.txt --rotate 360 --seconds 8 -o rotation.mp4
-      a glossy object, while the light rotates once about the vertical
-  relight render materials --normals normal.png --normals-y down --light studio.hdr -o materials.png
-      the object in many materials; its map of normals has y down";
-
-/// How many decimal places frames have in their names.
-const PLACES: usize = 4;
+      a glossy object, while the light rotates once about the vertical";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -45,33 +38,13 @@ pub(crate) struct Arguments {
 enum RenderedResult {
     /// An image, or with --rotate a video in which the light rotates.
     Image(Box<ImageArguments>),
-    /// The object in many materials: smoothness 5 to 200 across, reflectance 0 to 40 % down.
-    Materials(Box<MaterialsArguments>),
 }
 
 #[derive(Args)]
 struct ImageArguments {
-    /// The image (.png, .exr), or with --rotate a video (.mp4, .webm) or a folder for PNG frames.
+    /// The image (.png, .exr), or with --rotate a video (.mp4, .webm).
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    #[command(flatten)]
-    render: RenderArguments,
-    #[command(flatten, next_help_heading = "Video")]
-    rotation: RotationArguments,
-}
-
-#[derive(Args)]
-struct MaterialsArguments {
-    /// The image (.png, .exr).
-    #[arg(short, long, value_name = "OUT")]
-    output: PathBuf,
-    #[command(flatten)]
-    render: RenderArguments,
-}
-
-/// The object, its light, and how it is shown.
-#[derive(Args)]
-struct RenderArguments {
     /// Brightness in stops: 0 shows a white surface in even light of radiance 1 as white; auto, one that faces the strongest
     /// light, and without --rotate more if that comes from behind.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
@@ -89,6 +62,8 @@ struct RenderArguments {
     /// Also write the light's coefficients to this file.
     #[arg(long, value_name = "FILE")]
     save_light: Option<PathBuf>,
+    #[command(flatten, next_help_heading = "Video")]
+    rotation: RotationArguments,
 }
 
 #[derive(Clone, Copy)]
@@ -100,44 +75,29 @@ enum Exposure {
 impl Arguments {
     /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
-        match &self.result {
-            RenderedResult::Image(arguments) => {
-                let rotates = arguments.rotation.rotate.is_some();
-                let fault = arguments.render.fault();
-                fault.or_else(|| output_fault(&arguments.output, rotates))
-            }
-            RenderedResult::Materials(arguments) => {
-                let fault = arguments.render.fault();
-                fault.or_else(|| output_fault(&arguments.output, false))
-            }
-        }
+        let RenderedResult::Image(arguments) = &self.result;
+        arguments.fault()
     }
 }
 
-/// The fault of the output's name, if there is one.
-fn output_fault(output: &Path, rotates: bool) -> Option<String> {
-    let is_folder = output.extension().is_none();
-    let wanted = match OutputKind::from_path(output) {
-        Some(OutputKind::Png | OutputKind::Exr) if !rotates => return None,
-        Some(OutputKind::Movie(_)) if rotates => return None,
-        None if rotates && is_folder => return None,
-        _ if rotates => "a folder without an extension, .mp4 or .webm for --rotate",
-        _ => ".png or .exr",
-    };
-    Some(format!("--output {}: give {wanted}", output.display()))
-}
-
-impl RenderArguments {
+impl ImageArguments {
     fn fault(&self) -> Option<String> {
         if self.light.is_empty() {
             return Some("give the light with --light FILE or --lamp AZIMUTH,ELEVATION".to_owned());
         }
-        match &self.object.smoothness {
-            Map::Even([first, others @ ..]) if others.iter().any(|value| value != first) => {
-                Some("--smoothness: give one value or a file".to_owned())
-            }
-            _ => None,
+        if let Map::Even([first, others @ ..]) = &self.object.smoothness
+            && others.iter().any(|value| value != first)
+        {
+            return Some("--smoothness: give one value or a file".to_owned());
         }
+        let rotates = self.rotation.rotate.is_some();
+        let wanted = match OutputKind::from_path(&self.output) {
+            Some(OutputKind::Png | OutputKind::Exr) if !rotates => return None,
+            Some(OutputKind::Movie(_)) if rotates => return None,
+            _ if rotates => ".mp4 or .webm for --rotate",
+            _ => ".png or .exr",
+        };
+        Some(format!("--output {}: give {wanted}", self.output.display()))
     }
 
     /// The light, rotated; written to a file on request.
@@ -162,13 +122,13 @@ impl RenderArguments {
         Ok(light)
     }
 
-    /// `is_still` says that the light does not rotate, so that its side is known.
-    fn settings(&self, light: &ShLight, is_still: bool) -> RenderSettings {
+    fn settings(&self, light: &ShLight) -> RenderSettings {
         RenderSettings {
             diffuse: self.shading.diffuse(),
             specular: self.shading.specular(),
             exposure: match self.exposure {
-                Exposure::Auto if is_still => exposure_for_object(light),
+                // Of light that does not rotate the side is known.
+                Exposure::Auto if self.rotation.rotate.is_none() => exposure_for_object(light),
                 Exposure::Auto => exposure_for(light),
                 Exposure::Stops(stops) => stops.exp2() * relight_core::render::EXPOSURE,
             },
@@ -177,37 +137,21 @@ impl RenderArguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    match &arguments.result {
-        RenderedResult::Image(arguments) => image(arguments, console),
-        RenderedResult::Materials(arguments) => materials(arguments, console),
-    }
-}
-
-fn image(arguments: &ImageArguments, console: Console) -> CommandResult {
-    let scene = LitObject::read(&arguments.render, arguments.rotation.rotate.is_none())?;
-    let frames = if arguments.rotation.rotate.is_some() {
-        rotation(arguments, &scene, console)?;
-        arguments.rotation.frames()
-    } else {
-        let picture = scene.settings.image(&scene.surface, &scene.light)?;
-        write_picture(&arguments.output, &picture)?;
-        1
+    let RenderedResult::Image(arguments) = &arguments.result;
+    let scene = LitObject::read(arguments)?;
+    let frames = match OutputKind::from_path(&arguments.output) {
+        Some(OutputKind::Movie(format)) => film(arguments, format, &scene, console)?,
+        _ => {
+            let picture = scene.settings.image(&scene.surface, &scene.light)?;
+            write_picture(&arguments.output, &picture)?;
+            1
+        }
     };
-    report(&arguments.output, frames, &scene.settings, console);
-    Ok(Outcome::Success)
-}
-
-fn materials(arguments: &MaterialsArguments, console: Console) -> CommandResult {
-    const REFLECTED: [f32; 4] = [0.0, 0.04, 0.15, 0.4];
-    const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
-    let LitObject {
-        surface,
-        light,
-        settings,
-    } = LitObject::read(&arguments.render, true)?;
-    let sheet = settings.sweep(&surface, &light, &REFLECTED, &SMOOTHNESSES)?;
-    write_picture(&arguments.output, &sheet)?;
-    report(&arguments.output, 1, &settings, console);
+    let output = arguments.output.display().to_string();
+    let event = json!({
+        "event": "rendered", "output": output, "frames": frames, "exposure": scene.settings.exposure,
+    });
+    console.print(&output, &event);
     Ok(Outcome::Success)
 }
 
@@ -219,10 +163,10 @@ struct LitObject {
 }
 
 impl LitObject {
-    fn read(arguments: &RenderArguments, is_still: bool) -> Result<Self, Box<dyn Error>> {
+    fn read(arguments: &ImageArguments) -> Result<Self, Box<dyn Error>> {
         let surface = arguments.object.read()?;
         let light = arguments.read_light()?;
-        let settings = arguments.settings(&light, is_still);
+        let settings = arguments.settings(&light);
         Ok(Self {
             surface,
             light,
@@ -231,39 +175,25 @@ impl LitObject {
     }
 }
 
-fn report(output: &Path, frames: u32, settings: &RenderSettings, console: Console) {
-    let output = output.display().to_string();
-    let event = json!({ "event": "rendered", "output": output, "frames": frames, "exposure": settings.exposure });
-    console.print(&output, &event);
-}
-
-/// Writes the frames of a video in which the light rotates.
-fn rotation(
+/// Writes a video in which the light rotates; how many frames it has.
+fn film(
     arguments: &ImageArguments,
+    format: MovieFormat,
     scene: &LitObject,
     console: Console,
-) -> Result<(), Box<dyn Error>> {
+) -> Result<u32, InsertError> {
     let rotation = &arguments.rotation;
     let frame = |at: u32| {
         let part = rotation.degrees_at(at) / 360.0;
         let image = scene.settings.turned(&scene.surface, &scene.light, part)?;
         Ok::<_, InsertError>(image.encode())
     };
-    let (path, frames) = (&arguments.output, rotation.frames());
+    let frames = rotation.frames();
     let bar = console.progress(frames.into(), "frames");
-    if let Some(OutputKind::Movie(format)) = OutputKind::from_path(path) {
-        let encoding = (format, rotation.fps);
-        MovieWriter::write_frames(path, encoding, frames, frame, || bar.inc(1))?;
-    } else {
-        make_empty_folder(path)?;
-        (0..frames).into_par_iter().try_for_each(|at| {
-            frame(at)?.write_png(&path.join(format!("{at:0PLACES$}.png")))?;
-            bar.inc(1);
-            Ok::<_, InsertError>(())
-        })?;
-    }
+    let encoding = (format, rotation.fps);
+    MovieWriter::write_frames(&arguments.output, encoding, frames, frame, || bar.inc(1))?;
     bar.finish_and_clear();
-    Ok(())
+    Ok(frames)
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {
