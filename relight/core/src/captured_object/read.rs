@@ -1,8 +1,9 @@
 //! From bytes to a captured object, with limits.
 
 use std::io::{Cursor, Read};
+use std::path::Path;
 
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use relit_data::still::stored_size;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
@@ -10,13 +11,13 @@ use super::CapturedObject;
 use super::manifest::{
     CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest, check_size, damaged, no_archive,
 };
-use crate::image::{Extent, ImageError, Planes, Rgb};
+use crate::image::{Extent, ImageError, Planes, Rgb, StoredImage};
 use crate::light::{Normals, YUp};
 use crate::render::{Gloss, Surface};
 
 /// The longest `asset.json`, bytes.
 const MAX_MANIFEST: u64 = 1 << 16;
-/// The most bytes that decoding a map may take besides the map itself.
+/// The most bytes of a map beside those of its pixels.
 const DECODER: u64 = 1 << 20;
 /// Bytes of a map, at most, for each pixel: an incompressible image of four channels of 16 bits.
 const BYTES_A_PIXEL: u64 = 9;
@@ -127,40 +128,21 @@ impl Maps<'_> {
     }
 
     fn colours(&mut self, name: &'static str, white: f32) -> Result<Planes<3>, ImageError> {
-        let image = self.image(name)?.into_rgb16();
-        let channel = |channel: usize| -> Vec<f32> {
-            let pixels = image.as_raw().chunks_exact(3);
-            pixels.map(|pixel| value(pixel[channel], white)).collect()
-        };
-        Ok(Planes::from_planes(self.extent, [0, 1, 2].map(channel))?)
+        Ok(self.image(name)?.map(|value| value * white))
     }
 
     fn grey(&mut self, name: &'static str, white: f32) -> Result<Planes<1>, ImageError> {
-        let image = self.image(name)?.into_luma16();
-        let values = image.as_raw().iter().map(|&raw| value(raw, white));
-        Ok(Planes::from_planes(self.extent, [values.collect()])?)
+        let [values, ..] = self.colours(name, white)?.into_planes();
+        Planes::from_planes(self.extent, [values])
     }
 
-    fn image(&mut self, name: &'static str) -> Result<DynamicImage, ImageError> {
-        let pixels = self.extent.pixels() as u64;
-        let content = entry(&mut self.archive, name, BYTES_A_PIXEL * pixels + DECODER)?;
-        let wrong = damaged(name);
-        let mut limits = Limits::default();
-        limits.max_image_width = u32::try_from(self.extent.width).ok();
-        limits.max_image_height = u32::try_from(self.extent.height).ok();
-        limits.max_alloc = Some(BYTES_A_PIXEL * pixels + DECODER);
-        let mut reader = ImageReader::with_format(Cursor::new(content), ImageFormat::Png);
-        reader.limits(limits);
-        let image = reader.decode().map_err(wrong)?;
-        let found = Extent::new(image.width() as usize, image.height() as usize);
-        if found != self.extent {
-            let reason = format!("{} x {} pixels", found.width, found.height);
-            return Err(damaged(name)(reason));
+    fn image(&mut self, name: &'static str) -> Result<Planes<3>, ImageError> {
+        let most = BYTES_A_PIXEL * self.extent.pixels() as u64 + DECODER;
+        let content = entry(&mut self.archive, name, most)?;
+        let (width, height) = stored_size(&content).unwrap_or_default();
+        if [width, height] != self.extent.sides() {
+            return Err(damaged(name)(format!("{width} x {height} pixels")));
         }
-        Ok(image)
+        Ok(StoredImage::from_bytes(Path::new(name), &content)?.planes)
     }
-}
-
-fn value(raw: u16, white: f32) -> f32 {
-    f32::from(raw) / 65535.0 * white
 }
