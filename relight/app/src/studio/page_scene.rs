@@ -152,11 +152,6 @@ impl PageLight {
                 "the page cannot open a scene with light from a file: use relight insert",
             );
         }
-        if light.object.is_some() {
-            return refused(
-                "the page cannot open a scene with light from an object of the background: use relight insert",
-            );
-        }
         let found = light.lamp()?;
         let lamp = found.unwrap_or_default();
         let colour = light.lamp.as_deref().and_then(colour_of);
@@ -227,9 +222,8 @@ mod tests {
     #[test]
     fn light_that_the_page_has_not_is_refused_by_name() {
         let refused = |light: &str| PageScene::new(&parsed(light), &[1]).unwrap_err().0;
-        let [file, object] = ["panorama = \"c.hdr\"", "object = \"m.png\""].map(refused);
+        let file = refused("panorama = \"c.hdr\"");
         assert!(file.contains("file"), "{file}");
-        assert!(object.contains("object"), "{object}");
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub struct SceneDescription {
     pub objects: Vec<ObjectDescription>,
 }
 
-/// The source of the light, at most one of panorama, lamp, coefficients and object, and its rotation.
+/// The source of the light, at most one of panorama, lamp and coefficients, and its rotation.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightDescription {
@@ -87,8 +87,6 @@ pub struct LightDescription {
     pub ambient: Option<f64>,
     /// A text file of coefficients.
     pub coefficients: Option<PathBuf>,
-    /// The mask of an object in the background, from which its light is estimated.
-    pub object: Option<PathBuf>,
     /// Degrees by which it is rotated about the vertical, from the viewer to the right, and a panorama behind the objects with
     /// it.
     #[serde(default)]
@@ -174,7 +172,7 @@ impl SceneDescription {
     /// The files that it names: background, light, photographs and masks.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         let light = &self.light;
-        let lights = [&light.panorama, &light.coefficients, &light.object];
+        let lights = [&light.panorama, &light.coefficients];
         let objects = self.objects.iter();
         let objects = objects.flat_map(|object| iter::once(&object.photo).chain(&object.mask));
         iter::once(&self.background)
@@ -239,7 +237,6 @@ impl LightDescription {
             ("panorama", self.panorama.is_some()),
             ("lamp", self.lamp.is_some()),
             ("coefficients", self.coefficients.is_some()),
-            ("object", self.object.is_some()),
         ]
         .into_iter()
         .filter_map(|(name, is_given)| is_given.then_some(name))

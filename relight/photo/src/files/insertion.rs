@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{Linear, Planes, Rgb, StoredImage};
-use relit_data::causes::with_causes;
+use relight_core::image::{Linear, Planes, Rgb};
 use relit_data::geometry::Rect;
 
 use super::{
@@ -12,7 +11,8 @@ use super::{
     write_picture,
 };
 use crate::compositing::{
-    InsertScene, ObjectDescription, SceneBackground, SceneDescription, SceneEnvironment,
+    InsertScene, LightDescription, ObjectDescription, SceneBackground, SceneDescription,
+    SceneEnvironment,
 };
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
 use crate::export::{is_object, read_object};
@@ -91,15 +91,13 @@ impl<'a> Insertion<'a> {
     /// If a file cannot be read, or the light is dark.
     pub fn new(
         scene: &SceneDescription,
-        mut background: BackgroundFile,
+        background: BackgroundFile,
         folder: &Path,
         decomposer: &'a Decomposer,
         options: DecomposeOptions,
     ) -> Result<Self, InsertError> {
-        let first = first_of(&mut background)?;
-        let still = still_of(&background, first.as_ref())?;
-        let light = given_light(scene, folder, still, (decomposer, &options))?;
-        Self::before(scene, (background, first), light, decomposer, options)
+        let light = given_light(&scene.light, folder)?;
+        Self::in_light(scene, background, light, decomposer, options)
     }
 
     /// The same in a given light, which replaces that of the scene, or else in the background's.
@@ -114,16 +112,6 @@ impl<'a> Insertion<'a> {
         options: DecomposeOptions,
     ) -> Result<Self, InsertError> {
         let first = first_of(&mut background)?;
-        Self::before(scene, (background, first), light, decomposer, options)
-    }
-
-    fn before(
-        scene: &SceneDescription,
-        (background, first): (BackgroundFile, Option<Rgb<Linear>>),
-        light: Option<LightSource>,
-        decomposer: &'a Decomposer,
-        options: DecomposeOptions,
-    ) -> Result<Self, InsertError> {
         let still = still_of(&background, first.as_ref())?;
         let environment = SceneEnvironment::new(scene, still, light)?;
         Ok(Self {
@@ -295,32 +283,13 @@ fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertError> {
 
 /// The light that the scene names, if it names one.
 fn given_light(
-    scene: &SceneDescription,
+    light: &LightDescription,
     folder: &Path,
-    background: SceneBackground<'_>,
-    (decomposer, options): (&Decomposer, &DecomposeOptions),
 ) -> Result<Option<LightSource>, InsertError> {
-    let light = &scene.light;
     if let Some(lamp) = light.lamp()? {
         return Ok(Some(LightSource::Lamp(lamp)));
     }
-    if let Some(path) = light.panorama.as_ref().or(light.coefficients.as_ref()) {
-        return LightSource::read(&folder.join(path)).map(Some);
-    }
-    let Some(mask) = &light.object else {
-        return Ok(None);
-    };
-    let SceneBackground::Picture(picture) = background else {
-        return Err(InsertError::Input(
-            "light.object needs a photograph or a video as the background, not a panorama"
-                .to_owned(),
-        ));
-    };
-    let path = folder.join(mask);
-    let (mask, _) = StoredImage::read(&path)?.object_mask(&path)?;
-    let relightable =
-        RelightableObject::new(picture, &mask, None, decomposer, options).map_err(|source| {
-            InsertError::Input(format!("{}: {}", path.display(), with_causes(&source)))
-        })?;
-    Ok(Some(LightSource::Coefficients(relightable.light.clone())))
+    let file = light.panorama.as_ref().or(light.coefficients.as_ref());
+    file.map(|path| LightSource::read(&folder.join(path)))
+        .transpose()
 }
