@@ -166,19 +166,8 @@ fn seen(layer: &SceneLayer) -> [i64; 4] {
 
 /// The smallest rectangle around all that is covered: column, row, width and height.
 fn covered(alpha: &Planes<1>) -> [i64; 4] {
-    let width = alpha.extent().width.max(1);
-    let seen = || {
-        let values = alpha.plane(0).iter().enumerate();
-        values
-            .filter(|(_, value)| **value >= SEEN)
-            .map(|(at, _)| (at % width, at / width))
-    };
-    let Some(first) = seen().next() else {
+    let Some([columns, rows]) = alpha.bounds(SEEN) else {
         return [0; 4];
     };
-    let start = (first.0, first.0, first.1, first.1);
-    let (left, right, top, bottom) = seen().fold(start, |(left, right, top, bottom), (x, y)| {
-        (left.min(x), right.max(x), top.min(y), bottom.max(y))
-    });
-    [left, top, right - left + 1, bottom - top + 1].map(|side| side as i64)
+    [columns.start, rows.start, columns.len(), rows.len()].map(|side| side as i64)
 }

@@ -1,6 +1,7 @@
 //! Planes of `f32`, one a channel.
 
 use std::array;
+use std::ops::Range;
 
 use super::{Extent, ImageError, check_extent};
 use crate::parallel;
@@ -166,6 +167,16 @@ impl<const C: usize> Planes<C> {
         self
     }
 
+    /// The same image, each value combined with that of another image at its place.
+    pub fn zip(mut self, other: &Planes<1>, combine: impl Fn(f32, f32) -> f32) -> Self {
+        for plane in &mut self.planes {
+            for (value, &other) in plane.iter_mut().zip(other.plane(0)) {
+                *value = combine(*value, other);
+            }
+        }
+        self
+    }
+
     /// Calls `fill(y, row)` for every row, in parallel if there are threads; `row` has one slice a
     /// channel.
     pub fn fill_rows(&mut self, fill: impl Fn(usize, [&mut [f32]; C]) + Sync) {
@@ -180,6 +191,31 @@ impl<const C: usize> Planes<C> {
     fn at(&self, x: usize, y: usize) -> usize {
         assert!(x < self.extent.width, "column {x} of {:?}", self.extent);
         y * self.extent.width + x
+    }
+}
+
+impl Planes<1> {
+    /// A grey image as three equal channels.
+    pub fn in_colour(self) -> Planes<3> {
+        let [plane] = self.planes;
+        Planes {
+            extent: self.extent,
+            planes: [plane.clone(), plane.clone(), plane],
+        }
+    }
+
+    /// The columns and rows in which a value is at least `least`; `None` if none is.
+    pub fn bounds(&self, least: f32) -> Option<[Range<usize>; 2]> {
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        let values = self.plane(0).iter().enumerate();
+        for (at, _) in values.filter(|(_, value)| **value >= least) {
+            let place = [at % self.extent.width, at / self.extent.width];
+            for (axis, place) in place.into_iter().enumerate() {
+                low[axis] = low[axis].min(place);
+                high[axis] = high[axis].max(place + 1);
+            }
+        }
+        (high != [0; 2]).then(|| [low[0]..high[0], low[1]..high[1]])
     }
 }
 

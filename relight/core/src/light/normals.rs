@@ -119,11 +119,8 @@ impl<Y: YAxis> Normals<Y> {
     /// If the mask has another size.
     pub fn masked(mut self, mask: &Planes<1>) -> Result<Self, ImageError> {
         check_extent("mask", mask.extent(), self.extent())?;
-        for plane in self.planes.planes_mut() {
-            for (value, mask) in plane.iter_mut().zip(mask.plane(0)) {
-                *value = if *mask < 0.5 { 0.0 } else { *value };
-            }
-        }
+        let keep = |value, mask| if mask < 0.5 { 0.0 } else { value };
+        self.planes = self.planes.zip(mask, keep);
         Ok(self)
     }
 

@@ -139,13 +139,8 @@ impl<'a> InsertScene<'a> {
             object.placement,
             self.extent,
         ));
-        let mut premultiplied = colours.map(|v| v * gain);
-        for plane in premultiplied.planes_mut() {
-            plane
-                .iter_mut()
-                .zip(relightable.matte.alpha.plane(0))
-                .for_each(|(v, a)| *v *= a);
-        }
+        let premultiplied = colours.map(|v| v * gain);
+        let premultiplied = premultiplied.zip(&relightable.matte.alpha, |v, a| v * a);
         let alpha = placed.alpha.clone();
         let colours = placed.fit.apply(&premultiplied);
         let place = placed.foot.first_pixel(object.placement, self.extent);

@@ -22,7 +22,7 @@ impl CropSquare {
     /// The square around the pixels where the mask is at least one half, with 4 % more than their longer
     /// side; `None` without such pixels.
     pub fn around(mask: &Planes<1>) -> Option<Self> {
-        let sides = bounds(mask)?;
+        let sides = mask.bounds(0.5)?;
         let longest = sides.iter().map(Range::len).max()?;
         let side = (longest as f64 * (1.0 + MARGIN)).ceil() as usize;
         let [x, y] = sides.map(|line| ((line.start + line.end) as i64 - side as i64) / 2);
@@ -66,7 +66,7 @@ pub(super) struct Window {
 impl Window {
     /// The smallest that holds all pixels where the mask is at least one half.
     pub(super) fn around(mask: &Planes<1>) -> Option<Self> {
-        let [columns, rows] = bounds(mask)?;
+        let [columns, rows] = mask.bounds(0.5)?;
         Some(Self {
             at: [columns.start, rows.start],
             extent: Extent::new(columns.len(), rows.len()),
@@ -76,21 +76,6 @@ impl Window {
     pub(super) fn cut<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
         image.cut(self.at, self.extent)
     }
-}
-
-/// The columns and rows in which a mask is somewhere at least one half; `None` if it is empty.
-fn bounds(mask: &Planes<1>) -> Option<[Range<usize>; 2]> {
-    let Extent { width, .. } = mask.extent();
-    let mut low = [usize::MAX; 2];
-    let mut high = [0; 2];
-    let values = mask.plane(0).iter().enumerate();
-    for (at, _) in values.filter(|(_, value)| **value >= 0.5) {
-        for (axis, place) in [at % width, at / width].into_iter().enumerate() {
-            low[axis] = low[axis].min(place);
-            high[axis] = high[axis].max(place + 1);
-        }
-    }
-    (high != [0; 2]).then(|| [low[0]..high[0], low[1]..high[1]])
 }
 
 /// A picture, 0 outside its mask, and the mask, 0 or 1, in another size: each pixel is the mean of what the mask covers
@@ -109,24 +94,16 @@ pub(super) fn downscaled(
     let inside = share
         .clone()
         .map(|share| f32::from(u8::from(share >= least)));
-    let mut sums = picture.resized_part(part, &all);
-    for plane in sums.planes_mut() {
-        let places = share.plane(0).iter().zip(inside.plane(0));
-        for (value, (share, inside)) in plane.iter_mut().zip(places) {
-            *value *= inside / share.max(f32::MIN_POSITIVE);
-        }
-    }
-    (sums, inside)
+    let factors = (inside.clone()).zip(&share, |inside, share| {
+        inside / share.max(f32::MIN_POSITIVE)
+    });
+    let sums = picture.resized_part(part, &all);
+    (cut_out(sums, &factors), inside)
 }
 
 /// The image times the mask.
-pub(super) fn cut_out<const C: usize>(mut image: Planes<C>, mask: &Planes<1>) -> Planes<C> {
-    for plane in image.planes_mut() {
-        for (value, mask) in plane.iter_mut().zip(mask.plane(0)) {
-            *value *= mask;
-        }
-    }
-    image
+pub(super) fn cut_out<const C: usize>(image: Planes<C>, mask: &Planes<1>) -> Planes<C> {
+    image.zip(mask, |value, mask| value * mask)
 }
 
 /// A part of the image in another size, where only what lies inside the mask counts: the values at its edge go on

@@ -330,7 +330,7 @@ impl FittedLight {
         let maps = to_maps(whole.fields.clone(), &known)?;
         let normals = maps.normals;
         let shading = normalised(maps.shading, &known);
-        let target = Rgb::new(in_colour(shading.clone()));
+        let target = Rgb::new(shading.clone().in_colour());
         let steep = normals.clone().steeper(TILT);
         let light_near = |predicted| light_of_shading(&steep, &target, &known, predicted);
         let shading_light = light_near(None)?;
@@ -361,15 +361,6 @@ pub(super) fn usable(value: f32) -> f32 {
     } else {
         0.0
     }
-}
-
-/// A grey image as three equal channels.
-pub(crate) fn in_colour(grey: Planes<1>) -> Planes<3> {
-    let mut colour = Planes::zeros(grey.extent());
-    for plane in colour.planes_mut() {
-        plane.copy_from_slice(grey.plane(0));
-    }
-    colour
 }
 
 /// The root mean square of the difference over that of `b`.

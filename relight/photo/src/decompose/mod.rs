@@ -19,8 +19,6 @@ mod tiled_compose;
 mod usable_image;
 
 pub use crop::CropSquare;
-#[cfg(feature = "files")]
-pub(crate) use decomposer::in_colour;
 pub use decomposer::{
     DecomposeOptions, Decomposer, Decomposition, MAX_PIXELS, SpecularGate, WORKING_SIDE,
 };

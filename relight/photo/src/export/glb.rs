@@ -228,12 +228,8 @@ fn colours(object: &CapturedObject) -> Result<Vec<u8>, ImageError> {
 fn normal_map(object: &CapturedObject) -> Result<Vec<u8>, ImageError> {
     let normals = object.surface().normals();
     let all = vec![true; normals.extent().pixels()];
-    let mut colours = normals.completed(&all).to_colours();
-    for plane in colours.planes_mut() {
-        for value in plane.iter_mut() {
-            *value = value.clamp(0.0, 1.0);
-        }
-    }
+    let colours = normals.completed(&all).to_colours();
+    let colours = colours.map(|value| value.clamp(0.0, 1.0));
     encode_png(Path::new("normal.png"), &colours, Depth::Eight)
 }
 
@@ -252,13 +248,9 @@ fn roughness(gloss: &Gloss) -> Result<Vec<u8>, ImageError> {
 
 /// The colour of the reflection over its largest value, and that value over what a dielectric reflects.
 fn specular(gloss: &Gloss) -> Result<(Vec<u8>, f32), ImageError> {
-    let smoothness = gloss.smoothness().plane(0);
-    let mut part = gloss.reflectance().clone();
-    for plane in part.planes_mut() {
-        for (value, smoothness) in plane.iter_mut().zip(smoothness) {
-            *value = (*value * 8.0 / (smoothness.max(0.0) + 2.0)).clamp(0.0, 1.0);
-        }
-    }
+    let part = (gloss.reflectance().clone()).zip(gloss.smoothness(), |value, smoothness| {
+        (value * 8.0 / (smoothness.max(0.0) + 2.0)).clamp(0.0, 1.0)
+    });
     let most = part
         .planes()
         .into_iter()

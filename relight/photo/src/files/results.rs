@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use crate::decompose::{
     CropSquare, DecomposeError, DecomposeOptions, Decomposition, MaskSource, Photo, SpecularGate,
-    in_colour,
 };
 use relight_core::files::ResultFolder;
 use relight_core::files::{write_png, write_png_of};
@@ -257,7 +256,7 @@ impl DecompositionFiles<'_> {
         };
         let colour = |planes: &Planes<3>, white| shown(region.resized(planes, square()), white);
         let grey =
-            |planes: &Planes<1>, white| shown(in_colour(region.resized(planes, square())), white);
+            |planes: &Planes<1>, white| shown(region.resized(planes, square()).in_colour(), white);
         let tiles = [
             colour(picture, own),
             region.resized(&found.normals.to_colours(), square()),

@@ -105,15 +105,7 @@ fn between(plane: &[f32], extent: Extent, [x, y]: [f64; 2]) -> f32 {
 
 /// The rows in which an object covers at least half of a pixel.
 pub(crate) fn rows(alpha: &Planes<1>) -> Range<usize> {
-    let width = alpha.extent().width.max(1);
-    let covers = |line: &[f32]| line.iter().any(|&a| a >= 0.5);
-    let lines = || alpha.plane(0).chunks_exact(width);
-    let first = lines().position(covers);
-    let last = lines().rposition(covers);
-    match (first, last) {
-        (Some(first), Some(last)) => first..last + 1,
-        _ => 0..0,
-    }
+    alpha.bounds(0.5).map_or(0..0, |[_, rows]| rows)
 }
 
 /// The middle of an object's lower edge in its layer, pixels.
@@ -142,13 +134,8 @@ impl Foot {
 
 /// The columns in which an object covers at least half of a pixel.
 fn columns(alpha: &Planes<1>) -> Range<usize> {
-    let Extent { width, height } = alpha.extent();
-    let covers = |&x: &usize| (0..height).any(|y| alpha.pixel(x, y)[0] >= 0.5);
-    let (first, last) = ((0..width).find(covers), (0..width).rfind(covers));
-    match (first, last) {
-        (Some(first), Some(last)) => first..last + 1,
-        _ => 0..width,
-    }
+    let all = 0..alpha.extent().width;
+    alpha.bounds(0.5).map_or(all, |[columns, _]| columns)
 }
 
 /// The middle of these columns.

@@ -27,25 +27,18 @@ pub(crate) fn weighted_mean<const C: usize>(
     weights: &Planes<1>,
     radius: usize,
 ) -> (Planes<C>, Planes<1>) {
-    let mut sums = image.clone();
-    for plane in sums.planes_mut() {
-        for (value, weight) in plane.iter_mut().zip(weights.plane(0)) {
-            // What has no weight may be no number.
-            *value = if *weight > 0.0 { *value * weight } else { 0.0 };
-        }
-    }
-    let mut sums = blurred(&sums, radius);
+    // What has no weight may be no number.
+    let weighted = |value, weight| if weight > 0.0 { value * weight } else { 0.0 };
+    let sums = blurred(&image.clone().zip(weights, weighted), radius);
     let all = blurred(weights, radius);
-    for plane in sums.planes_mut() {
-        for (value, weight) in plane.iter_mut().zip(all.plane(0)) {
-            *value = if *weight > MIN_WEIGHT {
-                *value / weight
-            } else {
-                0.0
-            };
+    let mean = |sum, weight| {
+        if weight > MIN_WEIGHT {
+            sum / weight
+        } else {
+            0.0
         }
-    }
-    (sums, all)
+    };
+    (sums.zip(&all, mean), all)
 }
 
 /// Weights below this are rounding.

@@ -49,19 +49,10 @@ pub(crate) fn contact_sheet(
         plain(&surface.normals().to_colours()),
         lit(solution.albedo(curves).planes()),
         lit(shading.planes()),
-        plain(grey(&solution.confidence(curves)).planes()),
+        plain(&solution.confidence(curves).in_colour()),
         ball_tile,
     ];
     Ok(Planes::sheet(&tiles, COLUMNS)?)
-}
-
-/// A colour image of one plane.
-pub(crate) fn grey(plane: &Planes<1>) -> Rgb<Linear> {
-    let [values] = plane.planes();
-    let width = plane.extent().width;
-    Rgb::new(Planes::from_fn(plane.extent(), |x, y| {
-        [values[y * width + x]; 3]
-    }))
 }
 
 /// The size of the sheet's pictures: the frame's shape, `tile` high.

@@ -9,7 +9,7 @@ use relight_photo::files::write_light;
 use relit_data::durable::write_whole;
 use serde_json::{Value, json};
 
-use super::contact_sheet::{contact_sheet, grey};
+use super::contact_sheet::contact_sheet;
 use crate::error::TurnError;
 use crate::solving::SolvedTurn;
 
@@ -77,10 +77,10 @@ impl TurnFiles<'_> {
             "shading": write_light(&path("shading.png"), &shading)?,
         });
         for (name, plane) in [
-            ("confidence.png", &solution.confidence(curves)),
-            ("mask.png", &turn.mask),
+            ("confidence.png", solution.confidence(curves)),
+            ("mask.png", turn.mask.clone()),
         ] {
-            write_png(&path(name), grey(plane).planes(), Depth::Eight)?;
+            write_png(&path(name), &plane.in_colour(), Depth::Eight)?;
         }
         let light = solution.light()?;
         light.write(&path("light.txt"))?;

@@ -170,13 +170,10 @@ fn read_turned_normals(path: &Path) -> Result<Normals<YUp>, ImageError> {
 /// The normals without those where `valid` is 0.
 fn only_where(normals: &Normals<YUp>, valid: &Planes<1>) -> Result<Normals<YUp>, ReadError> {
     check_extent("map of valid normals", valid.extent(), normals.extent())?;
-    let mut planes = normals.planes().clone();
-    for plane in planes.planes_mut() {
-        for (value, valid) in plane.iter_mut().zip(valid.plane(0)) {
-            *value *= valid;
-        }
-    }
-    Ok(Normals::new(planes))
+    let planes = normals.planes().clone();
+    Ok(Normals::new(
+        planes.zip(valid, |value, valid| value * valid),
+    ))
 }
 
 fn check_extents(sample: &TruthSample) -> Result<(), ReadError> {
