@@ -14,7 +14,7 @@ use std::process::Command;
 use relight_core::files::{write_exr, write_png};
 use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
-use relight_core::light::{Direction, Normals, Rotation, ShLight, YDown, YUp};
+use relight_core::light::{Direction, Normals, Rotation, ShLight};
 use relight_core::metrics::MetricError;
 use relight_core::reader::{TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, Layers, SpecularForm, Surface};
@@ -32,7 +32,7 @@ use relit_test_support::is_named;
 const SIDE: usize = 44;
 const EXTENT: Extent = Extent::new(SIDE, SIDE);
 
-fn sphere() -> Normals<YUp> {
+fn sphere() -> Normals {
     Normals::sphere(SIDE)
 }
 
@@ -249,7 +249,7 @@ fn predicted_normals_are_read_in_the_axes_that_are_told() {
     write_set(&truth);
     for name in ["cup", "pear"] {
         fs::create_dir_all(found.join(name)).unwrap();
-        let down: Normals<YDown> = sphere().flipped();
+        let down: Normals = sphere().flipped();
         let path = found.join(name).join("normal.png");
         down.write_png(&path, Depth::Sixteen).unwrap();
     }

@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Linear, Rgb, Transfer};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, ShLight};
 use relight_core::metrics::angular_error;
 use relight_core::render::Surface;
 use relight_synth::{
@@ -60,7 +60,7 @@ fn truth(folder: &Path) -> (f64, ShLight) {
 }
 
 fn surface(folder: &Path) -> Surface {
-    let normals = Normals::<YUp>::read(&folder.join("normal.png")).unwrap();
+    let normals = Normals::read(&folder.join("normal.png")).unwrap();
     let albedo = Rgb::<Linear>::read(&folder.join("albedo.png"), Transfer::Linear).unwrap();
     Surface::new(normals, albedo, None).unwrap()
 }
@@ -213,7 +213,7 @@ fn a_known_light_helps() {
         let degrees = degrees.to_string();
         let arguments = ["turn", shard, "--json", "-o", &out, "--elevation", &degrees];
         figures_of(&relight(&[&arguments[..], options].concat()));
-        let found = Normals::<YUp>::read(&Path::new(&out).join("normal.png")).unwrap();
+        let found = Normals::read(&Path::new(&out).join("normal.png")).unwrap();
         let truth = surface.normals().planes().planes();
         let mask: Vec<bool> = truth[2].iter().map(|&z| z > 0.0).collect();
         let found = found.completed(&mask);

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use relight_core::image::Extent;
-use relight_core::light::{Direction, Normals, Order, Panorama, YUp};
+use relight_core::light::{Direction, Normals, Order, Panorama};
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 
 const ORDERS: [usize; 7] = [2, 4, 8, 12, 24, 48, 64];
@@ -100,7 +100,7 @@ impl Irradiance {
     }
 
     /// The root mean square of the layer's difference over that of the irradiance, on the front of a sphere.
-    fn error(&self, layer: &DiffuseLayer, normals: &Normals<YUp>) -> f64 {
+    fn error(&self, layer: &DiffuseLayer, normals: &Normals) -> f64 {
         let shading = layer.shading(normals);
         let (mut square, mut whole) = (0.0, 0.0);
         for y in (0..SIDE).step_by(3) {

@@ -9,7 +9,7 @@ use std::error::Error;
 use std::path::Path;
 
 use relight_core::image::{Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::light::{Direction, Normals, Order, Panorama, YUp};
+use relight_core::light::{Direction, Normals, Order, Panorama};
 use relight_core::render::{
     DiffuseForm, DiffuseLayer, Gloss, LobeLayer, PowerLayer, RenderSettings, SpecularForm, Surface,
     exposure_for,
@@ -152,7 +152,7 @@ fn mug(side: usize) -> Result<Surface, Box<dyn Error>> {
         hits[y * side + x].map_or([0.0; 3], |hit| slope(hit).map(|v| v as f32))
     });
     let albedo = Planes::from_fn(extent, |x, y| hits[y * side + x].map_or([0.0; 3], colour));
-    let normals = Normals::<YUp>::new(normals);
+    let normals = Normals::new(normals);
     let gloss = Gloss::even(extent, [0.25; 3], 80.0);
     Ok(Surface::new(normals, Rgb::new(albedo), Some(gloss))?)
 }

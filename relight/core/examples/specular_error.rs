@@ -10,7 +10,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use relight_core::image::{Linear, Rgb};
-use relight_core::light::{Normals, Order, Panorama, YUp};
+use relight_core::light::{Normals, Order, Panorama};
 use relight_core::render::{Gloss, LobeLayer, PowerLayer};
 
 const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
@@ -71,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The errors under one panorama, in the order of the columns.
 fn row(
     panorama: &Panorama,
-    normals: &Normals<YUp>,
+    normals: &Normals,
     smoothness: f32,
 ) -> Result<[f64; COLUMNS.len()], Box<dyn Error>> {
     let gloss = Gloss::even(normals.extent(), [1.0; 3], smoothness);

@@ -3,7 +3,7 @@
 use super::run::{NOT_MEASURED, compared, cut_out, evaluate, need, object};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreLine, ScoreTable};
 use relight_core::image::Planes;
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relight_core::metrics::{AngularError, SSIM_WINDOW, ScaleFit, angular_error, dssim};
 use relight_core::reader::{TruthSample, TruthSet};
 
@@ -41,7 +41,7 @@ pub fn evaluate_normals(
     )
 }
 
-fn score(sample: &TruthSample, found: &Normals<YUp>) -> Result<Vec<ScoreLine>, EvalError> {
+fn score(sample: &TruthSample, found: &Normals) -> Result<Vec<ScoreLine>, EvalError> {
     let truth = need(sample, "normals", &sample.normals)?;
     let known = known(sample, truth);
     let whole = vec![true; known.len()];
@@ -68,7 +68,7 @@ fn score(sample: &TruthSample, found: &Normals<YUp>) -> Result<Vec<ScoreLine>, E
 }
 
 /// The pixels of the object whose true normal is known.
-pub(super) fn known(sample: &TruthSample, truth: &Normals<YUp>) -> Vec<bool> {
+pub(super) fn known(sample: &TruthSample, truth: &Normals) -> Vec<bool> {
     let [x, y, z] = truth.planes().planes();
     let mask = object(sample).into_iter().enumerate();
     mask.map(|(at, inside)| inside && (x[at], y[at], z[at]) != (0.0, 0.0, 0.0))

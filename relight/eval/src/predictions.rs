@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::EvalError;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
-use relight_core::light::{LightError, Normals, NormalsFrame, ShLight, YDown, YUp};
+use relight_core::light::{LightError, Normals, NormalsFrame, ShLight};
 use relit_data::text;
 
 /// A folder with a folder of estimates for each image of the ground truth, of the same name:
@@ -89,11 +89,11 @@ impl Predictions {
     }
 
     /// The predicted normals of the sample `name`.
-    pub(super) fn normals(&self, name: &str, extent: Extent) -> Result<Normals<YUp>, EvalError> {
+    pub(super) fn normals(&self, name: &str, extent: Extent) -> Result<Normals, EvalError> {
         let path = self.find(name, "normal")?;
         let normals = match self.frame {
-            NormalsFrame::YUp => Normals::<YUp>::read(&path)?,
-            NormalsFrame::YDown => Normals::<YDown>::read(&path)?.flipped(),
+            NormalsFrame::YUp => Normals::read(&path)?,
+            NormalsFrame::YDown => Normals::read(&path)?.flipped(),
         };
         Ok(Normals::new(brought_to(
             path,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, ShLight};
 use relight_core::metrics::{Comparison, MetricError, ScaleFit, angle};
 use relight_synth::SequenceDescription;
 use relight_turn::{
@@ -45,7 +45,7 @@ struct TurnSet {
 /// A turn and its ground truth.
 struct TrueTurn {
     shard: PathBuf,
-    normals: Normals<YUp>,
+    normals: Normals,
     albedo: Rgb<Linear>,
     elevation: Elevation,
     light: ShLight,
@@ -81,7 +81,7 @@ impl TurnSet {
         let [_, up, out] = description.axis;
         Ok(TrueTurn {
             shard: shard.clone(),
-            normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
+            normals: Normals::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
             elevation: Elevation::measured(out.atan2(up).to_degrees())?,
             light: read_light(&truth.join("light.txt"))?,

@@ -6,7 +6,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use relight_core::image::{ColourSpace, Planes, Rgb, Srgb};
-use relight_core::light::{Direction, Normals, Order, Rotation, YUp};
+use relight_core::light::{Direction, Normals, Order, Rotation};
 use relight_core::render::{
     DiffuseForm, EXPOSURE, Gloss, RenderSettings, SpecularForm, Surface, exposure_for,
 };
@@ -64,7 +64,7 @@ pub(crate) fn render<'py>(
                 Some(Gloss::new(reflectance, smoothness)?)
             }
         };
-        let surface = Surface::new(Normals::<YUp>::new(normals), Rgb::new(albedo), gloss)?;
+        let surface = Surface::new(Normals::new(normals), Rgb::new(albedo), gloss)?;
         let light = light.coefficients(Order::new(order)?)?;
         let turned = turned.iter().map(|degrees| {
             let turn = Rotation::about(Direction::UP, degrees.to_radians());

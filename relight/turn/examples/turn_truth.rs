@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::reader::{Encoding, SampleId, Source, Turns};
 use relight_core::render::Surface;
@@ -80,7 +80,7 @@ impl Truth {
             let elevation = json["basis"]["config"]["camera"]["elevation"].as_f64();
             let crop = crop(shard)?;
             let part = |planes: &Planes<3>| cut(planes, crop).resized(turn.curves.extent());
-            let normals = Normals::<YUp>::read(&folder.join("normal_gt.png"))?;
+            let normals = Normals::read(&folder.join("normal_gt.png"))?;
             let albedo = Rgb::<Linear>::read(&folder.join("albedo_gt.png"), Transfer::Linear)?;
             let normals = Normals::new(part(normals.planes()));
             (
@@ -92,7 +92,7 @@ impl Truth {
             let json: Value = serde_json::from_slice(&fs::read(folder.join("turn.json"))?)?;
             let axis = |at: usize| json["axis"][at].as_f64().ok_or("no axis");
             let elevation = axis(2)?.atan2(axis(1)?).to_degrees();
-            let normals = Normals::<YUp>::read(&folder.join("normal.png"))?;
+            let normals = Normals::read(&folder.join("normal.png"))?;
             let albedo = Rgb::<Linear>::read(&folder.join("albedo.png"), Transfer::Linear)?;
             (normals, albedo, elevation)
         };
@@ -158,7 +158,7 @@ impl Truth {
         Ok(())
     }
 
-    fn angles(&self, name: &str, normals: &Normals<YUp>) -> Result<(), Box<dyn Error>> {
+    fn angles(&self, name: &str, normals: &Normals) -> Result<(), Box<dyn Error>> {
         let whole = normals.completed(&self.mask);
         let truth = self.surface.normals().planes().planes();
         let error = angular_error(normals.extent(), truth, whole.planes().planes(), &self.mask)?;

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
+use relight_core::light::{Direction, Normals, Order, Rotation, ShLight};
 use relight_core::metrics::angular_error;
 use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 
@@ -121,7 +121,7 @@ pub(crate) fn solve(curves: &TurnCurves, light: &ShLight) -> TurnSolution {
 }
 
 /// The median of the angle between normals, degrees: at the rim a few pixels have two answers.
-pub(crate) fn off(surface: &Surface, normals: &Normals<YUp>) -> f64 {
+pub(crate) fn off(surface: &Surface, normals: &Normals) -> f64 {
     let mask: Vec<bool> = mask(surface).plane(0).iter().map(|&m| m >= 0.5).collect();
     let truth = surface.normals().planes().planes();
     angular_error(surface.extent(), truth, normals.planes().planes(), &mask)

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use relight_core::image::{Planes, Rgb};
-use relight_core::light::{Normals, Order, ShLight, YUp};
+use relight_core::light::{Normals, Order, ShLight};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
@@ -18,7 +18,7 @@ struct Quality {
 
 /// The quality of the layers of a painted ball in the light of a lamp.
 fn quality(weights: &Weights) -> Quality {
-    let truth = Normals::<YUp>::sphere(120);
+    let truth = Normals::sphere(120);
     let extent = truth.extent();
     let mut light = ShLight::even(Order::TWO, [0.25; 3]);
     for (at, value) in [(1, 0.35), (2, 0.35), (3, -0.3)] {

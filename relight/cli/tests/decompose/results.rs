@@ -4,7 +4,7 @@ use std::fs;
 
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, Rgb, Transfer};
-use relight_core::light::{Normals, Panorama, ShLight, YUp};
+use relight_core::light::{Normals, Panorama, ShLight};
 use relight_photo::decompose::MaskSource;
 use relight_photo::files::PhotoReading;
 use relit_test_support::is_named;
@@ -51,7 +51,7 @@ fn a_folder_holds_every_layer_the_light_and_the_figures() {
             assert!((a * white - b).abs() < 1e-3 * white, "{name}: {a} {b}");
         }
     }
-    let normals = Normals::<YUp>::read(&out.join("normal.png")).unwrap();
+    let normals = Normals::read(&out.join("normal.png")).unwrap();
     let pairs = normals
         .planes()
         .plane(1)

@@ -1,13 +1,13 @@
 //! The ground truth of the examples: the Blinn-Phong highlight summed over the pixels of a panorama.
 
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::light::{Direction, Normals, Panorama, YUp};
+use relight_core::light::{Direction, Normals, Panorama};
 use relight_core::parallel;
 
 /// The highlight of smoothness `smoothness` and reflectance 1; with `closed`, light from behind the surface is left out.
 pub(crate) fn highlight(
     panorama: &Panorama,
-    normals: &Normals<YUp>,
+    normals: &Normals,
     smoothness: f32,
     closed: bool,
 ) -> Rgb<Linear> {

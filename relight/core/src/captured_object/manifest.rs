@@ -34,7 +34,7 @@ pub(super) fn damaged<E: Display>(entry: &'static str) -> impl Fn(E) -> ImageErr
     move |reason| ImageError::Other(format!("its entry {entry} is missing or damaged: {reason}"))
 }
 
-/// That bytes are no archive.
+/// For bytes that are not an archive.
 pub(super) fn no_archive(fault: ZipError) -> ImageError {
     ImageError::Other(format!("it is not a ZIP archive, or is damaged: {fault}"))
 }

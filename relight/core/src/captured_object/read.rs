@@ -12,7 +12,7 @@ use super::manifest::{
     CAPTURED_OBJECT_SCHEMA, MANIFEST, Manifest, check_size, damaged, no_archive,
 };
 use crate::image::{Extent, ImageError, Planes, Rgb, StoredImage};
-use crate::light::{Normals, YUp};
+use crate::light::Normals;
 use crate::render::{Gloss, Surface};
 
 /// The longest `asset.json`, bytes.
@@ -97,7 +97,7 @@ struct Maps<'a> {
 }
 
 impl Maps<'_> {
-    fn normals(&mut self) -> Result<Normals<YUp>, ImageError> {
+    fn normals(&mut self) -> Result<Normals, ImageError> {
         Ok(Normals::from_colours(self.colours("normal.png", 1.0)?))
     }
 

@@ -13,7 +13,7 @@ use crate::image::{
     ColourImage, Depth, Extent, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage,
     Transfer, encode_exr, encode_jpeg, encode_png, encode_png_of,
 };
-use crate::light::{LightError, Normals, Panorama, ShLight, YAxis};
+use crate::light::{LightError, Normals, Panorama, ShLight};
 
 /// Writes values of 0 to 1 as integers; others are clipped.
 ///
@@ -130,7 +130,7 @@ impl Panorama {
     }
 }
 
-impl<Y: YAxis> Normals<Y> {
+impl Normals {
     /// Reads a PNG, 8 or 16 bits, of colours `(n + 1) / 2`, or an EXR of the vectors themselves. No
     /// file does not state the direction of y: the caller gives it by `Y`.
     ///

@@ -26,7 +26,7 @@ pub use coefficients::ShLight;
 pub use direction::Direction;
 pub use error::LightError;
 pub use least_squares::NormalEquations;
-pub use normals::{Normals, NormalsFrame, YAxis, YDown, YUp};
+pub use normals::{Normals, NormalsFrame};
 pub use order::Order;
 pub use panorama::{LightSample, LightSampler, Panorama};
 pub(crate) use quadrature::Quadrature;

@@ -1,64 +1,28 @@
-//! Normal maps that know which way y points.
+//! Normal maps.
 
 use std::f32::consts::FRAC_PI_2;
-use std::fmt::Debug;
-use std::marker::PhantomData;
 
 use crate::image::{Extent, ImageError, Planes, check_extent};
 
 /// Vectors shorter than this stand for no surface: a map's background, however it was encoded.
 const MIN_LENGTH: f32 = 0.1;
 
-/// Which way y points in a normal map. [`YUp`] or [`YDown`].
-pub trait YAxis: Copy + Debug + Send + Sync + 'static {
-    /// The other way.
-    type Opposite: YAxis<Opposite = Self>;
-}
-
-/// x to the right, y up, z to the viewer: the frame of everything that renders.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum YUp {}
-
-/// x to the right, y down, z to the viewer: the paper's colour figure and its released data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum YDown {}
-
-impl YAxis for YUp {
-    type Opposite = YDown;
-}
-
-impl YAxis for YDown {
-    type Opposite = YUp;
-}
-
-/// A map of unit normals, one a pixel; the zero vector outside the object.
-///
-/// Only [`Normals<YUp>`] can be lit. The other kind has to be turned over:
+/// A map of unit normals, one a pixel; the zero vector outside the object: x to the right, y up, z to the viewer. Maps whose y
+/// points down, as the paper's, are flipped:
 ///
 /// ```
 /// use relight_core::image::{Extent, Planes};
-/// use relight_core::light::{Normals, YDown, YUp};
+/// use relight_core::light::Normals;
 ///
 /// let tilted = Planes::filled(Extent::new(2, 2), [0.0, 3.0, 4.0]);
-/// let up: Normals<YUp> = Normals::<YDown>::new(tilted).flipped();
-/// assert_eq!(up.planes().pixel(0, 0), [0.0, -0.6, 0.8]);
-/// ```
-///
-/// A mix-up does not compile:
-///
-/// ```compile_fail
-/// use relight_core::image::{Extent, Planes};
-/// use relight_core::light::{Normals, YDown, YUp};
-///
-/// let up: Normals<YUp> = Normals::<YDown>::new(Planes::zeros(Extent::new(2, 2)));
+/// assert_eq!(Normals::new(tilted).flipped().planes().pixel(0, 0), [0.0, -0.6, 0.8]);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Normals<Y> {
+pub struct Normals {
     planes: Planes<3>,
-    axis: PhantomData<Y>,
 }
 
-impl<Y: YAxis> Normals<Y> {
+impl Normals {
     /// The map of these vectors, each brought to length 1; those shorter than 0.1, or that are not
     /// numbers, stand for no surface.
     pub fn new(mut planes: Planes<3>) -> Self {
@@ -68,10 +32,7 @@ impl<Y: YAxis> Normals<Y> {
             let is_surface = length >= MIN_LENGTH && length.is_finite();
             [*x, *y, *z] = [*x, *y, *z].map(|v| if is_surface { v / length } else { 0.0 });
         }
-        Self {
-            planes,
-            axis: PhantomData,
-        }
+        Self { planes }
     }
 
     /// The map with these colours `(n + 1) / 2`, 0 to 1; black is outside the object.
@@ -100,17 +61,14 @@ impl<Y: YAxis> Normals<Y> {
     }
 
     /// The same surface with y the other way.
-    pub fn flipped(self) -> Normals<Y::Opposite> {
-        let mut planes = self.planes;
-        let [_, y, _] = planes.planes_mut();
+    #[must_use]
+    pub fn flipped(mut self) -> Self {
+        let [_, y, _] = self.planes.planes_mut();
         for value in y {
             // A plain 0 stays one.
             *value = 0.0 - *value;
         }
-        Normals {
-            planes,
-            axis: PhantomData,
-        }
+        self
     }
 
     /// The same map with no surface where the mask is below one half.
@@ -135,7 +93,6 @@ impl<Y: YAxis> Normals<Y> {
             .collect();
         Self {
             planes: self.planes.clone().extended(&known, mask),
-            axis: PhantomData,
         }
     }
 
@@ -162,19 +119,7 @@ impl<Y: YAxis> Normals<Y> {
     pub const fn extent(&self) -> Extent {
         self.planes.extent()
     }
-}
 
-/// Which way y points in a file of normals, where that is known only at run time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum NormalsFrame {
-    /// As in [`YUp`]: what relight writes.
-    #[default]
-    YUp,
-    /// As in [`YDown`].
-    YDown,
-}
-
-impl Normals<YUp> {
     /// The same map with each normal's angle to the viewer's axis times `factor`, at most a right angle. What points away from
     /// the viewer stays as it is.
     #[must_use]
@@ -207,6 +152,16 @@ impl Normals<YUp> {
     }
 }
 
+/// Which way y points in a file of normals, where that is known only at run time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NormalsFrame {
+    /// What relight writes.
+    #[default]
+    YUp,
+    /// As in the paper's colour figure and its released data.
+    YDown,
+}
+
 /// The colour `(n + 1) / 2` of a normal; black outside the object.
 fn colour(normal: [f32; 3]) -> [f32; 3] {
     let is_surface = normal.iter().any(|&v| v != 0.0);
@@ -217,7 +172,7 @@ fn colour(normal: [f32; 3]) -> [f32; 3] {
 mod tests {
     use super::*;
 
-    fn three() -> Normals<YUp> {
+    fn three() -> Normals {
         let vectors = [[0.0, 0.6, 0.8], [0.0; 3], [-1.0, 0.0, 0.0]];
         Normals::new(Planes::from_fn(Extent::new(3, 1), |x, _| vectors[x]))
     }
@@ -229,7 +184,7 @@ mod tests {
         three()
             .write_png(&path, crate::image::Depth::Sixteen)
             .unwrap();
-        let back = Normals::<YUp>::read(&path).unwrap();
+        let back = Normals::read(&path).unwrap();
         assert_eq!(back.planes().pixel(1, 0), [0.0; 3]);
         let pairs = back
             .planes()
@@ -245,7 +200,7 @@ mod tests {
     fn steeper_normals_are_tilted_by_a_factor_and_never_beyond_the_outline() {
         let (sin, cos) = 0.4_f32.sin_cos();
         let vectors = [[sin, 0.0, cos], [0.0, 0.6, 0.8], [0.0; 3], [0.0, 0.0, -1.0]];
-        let flat = Normals::<YUp>::new(Planes::from_fn(Extent::new(4, 1), |x, _| vectors[x]));
+        let flat = Normals::new(Planes::from_fn(Extent::new(4, 1), |x, _| vectors[x]));
         let near = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
         let steep = flat.clone().steeper(1.5);
         assert!(near(
@@ -266,7 +221,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("normal.exr");
         crate::files::write_exr(&path, three().planes()).unwrap();
-        assert_eq!(Normals::<YUp>::read(&path).unwrap(), three());
+        assert_eq!(Normals::read(&path).unwrap(), three());
     }
 
     #[test]
@@ -276,9 +231,9 @@ mod tests {
 
     #[test]
     fn mid_grey_and_not_a_number_are_background() {
-        let grey = Normals::<YUp>::from_colours(Planes::filled(Extent::new(1, 1), [0.502; 3]));
+        let grey = Normals::from_colours(Planes::filled(Extent::new(1, 1), [0.502; 3]));
         assert_eq!(grey.planes().pixel(0, 0), [0.0; 3]);
-        let nan = Normals::<YUp>::new(Planes::filled(Extent::new(1, 1), [f32::NAN; 3]));
+        let nan = Normals::new(Planes::filled(Extent::new(1, 1), [f32::NAN; 3]));
         assert_eq!(nan.planes().pixel(0, 0), [0.0; 3]);
     }
 }

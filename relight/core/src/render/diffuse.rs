@@ -6,7 +6,7 @@ use super::series::HarmonicSeries;
 use super::simd;
 use super::simd::{Kernel, Lanes, Number};
 use crate::image::{Linear, Planes, Rgb};
-use crate::light::{Normals, Order, ShLight, YUp};
+use crate::light::{Normals, Order, ShLight};
 
 /// How the shading of a Lambertian surface follows from the light's coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -105,7 +105,7 @@ impl DiffuseLayer {
     }
 
     /// The shading S, 0 outside the object.
-    pub fn shading(&self, normals: &Normals<YUp>) -> Rgb<Linear> {
+    pub fn shading(&self, normals: &Normals) -> Rgb<Linear> {
         let mut shading = Planes::zeros(normals.extent());
         simd::run(self, normals.planes().planes(), shading.planes_mut());
         Rgb::new(shading)

@@ -2,7 +2,7 @@
 
 use super::diffuse::terms;
 use crate::image::{Linear, Rgb};
-use crate::light::{Direction, LightError, NormalEquations, Normals, Order, ShLight, YUp};
+use crate::light::{Direction, LightError, NormalEquations, Normals, Order, ShLight};
 
 /// Added to the equations, relative to their diagonal, so that few or equal normals have a light too.
 const RIDGE: f64 = 1e-8;
@@ -30,7 +30,7 @@ const RIDGE: f64 = 1e-8;
 /// # Ok::<(), relight_core::light::LightError>(())
 /// ```
 pub fn fit_light(
-    normals: &Normals<YUp>,
+    normals: &Normals,
     shading: &Rgb<Linear>,
     mask: &[bool],
     stiffness: f64,
@@ -50,7 +50,7 @@ pub fn fit_light(
 /// As [`fit_light`].
 pub fn fit_light_near(
     near: &ShLight,
-    normals: &Normals<YUp>,
+    normals: &Normals,
     shading: &Rgb<Linear>,
     mask: &[bool],
     stiffness: f64,

@@ -6,7 +6,7 @@ use super::series::HarmonicSeries;
 use super::simd::{Kernel, Lanes, Number};
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
-use crate::light::{Normals, Order, Quadrature, ShLight, YUp, polar_functions};
+use crate::light::{Normals, Order, Quadrature, ShLight, polar_functions};
 
 /// A specular layer for one light, of any order: H(n) = s_p ∫ L(ω) max(0, n·b)^α dω, where b is half way
 /// between ω and the viewer.
@@ -64,11 +64,7 @@ impl LobeLayer {
     ///
     /// # Errors
     /// If the maps differ in size.
-    pub fn highlight(
-        &self,
-        normals: &Normals<YUp>,
-        gloss: &Gloss,
-    ) -> Result<Rgb<Linear>, ImageError> {
+    pub fn highlight(&self, normals: &Normals, gloss: &Gloss) -> Result<Rgb<Linear>, ImageError> {
         super::highlight(self, normals, gloss)
     }
 }

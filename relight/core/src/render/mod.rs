@@ -24,13 +24,13 @@ pub use sequence::{RenderSettings, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};
 
 use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};
-use crate::light::{Normals, YUp};
+use crate::light::Normals;
 use simd::Kernel;
 
 /// The highlight H of a whole image.
 fn highlight(
     layer: &impl Kernel<7, 3>,
-    normals: &Normals<YUp>,
+    normals: &Normals,
     gloss: &Gloss,
 ) -> Result<Rgb<Linear>, ImageError> {
     check_extent("map of gloss", gloss.extent(), normals.extent())?;

@@ -4,7 +4,7 @@ use super::diffuse::COSINE_LOBE;
 use super::simd::{Kernel, Lanes, Number};
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
-use crate::light::{Normals, ShLight, YUp};
+use crate::light::{Normals, ShLight};
 
 /// The specular layer of the paper's section 4.2.2 for one light:
 /// H(n) = s_p Σ C_lm (Â_l Ŷ_lm(n))^α, where Ŷ is Y at twice the polar angle.
@@ -47,11 +47,7 @@ impl PowerLayer {
     ///
     /// # Errors
     /// If the maps differ in size.
-    pub fn highlight(
-        &self,
-        normals: &Normals<YUp>,
-        gloss: &Gloss,
-    ) -> Result<Rgb<Linear>, ImageError> {
+    pub fn highlight(&self, normals: &Normals, gloss: &Gloss) -> Result<Rgb<Linear>, ImageError> {
         super::highlight(self, normals, gloss)
     }
 }

@@ -1,7 +1,7 @@
 //! A surface to light: the maps of an object.
 
 use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
-use crate::light::{Normals, YUp};
+use crate::light::Normals;
 
 /// How a surface shines: specular reflectance s_p, one a channel, and smoothness α, the exponent of
 /// Blinn and Phong, above 0.
@@ -58,7 +58,7 @@ impl Gloss {
 /// The maps of an object, all of one size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    normals: Normals<YUp>,
+    normals: Normals,
     albedo: Rgb<Linear>,
     gloss: Option<Gloss>,
 }
@@ -69,7 +69,7 @@ impl Surface {
     /// # Errors
     /// If they differ in size.
     pub fn new(
-        normals: Normals<YUp>,
+        normals: Normals,
         albedo: Rgb<Linear>,
         gloss: Option<Gloss>,
     ) -> Result<Self, ImageError> {
@@ -93,7 +93,7 @@ impl Surface {
     }
 
     /// The normals.
-    pub const fn normals(&self) -> &Normals<YUp> {
+    pub const fn normals(&self) -> &Normals {
         &self.normals
     }
 

@@ -9,7 +9,7 @@ use crate::EvalError;
 use crate::predictions::{NO_SET, read_light};
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, ShLight};
 use relight_core::render::{Gloss, Surface};
 
 /// The description's schema.
@@ -134,7 +134,7 @@ impl RelightingSet {
         let name = object_folder(number);
         let folder = self.root.join(&name);
         let (mask, _) = read_planes(&folder.join("mask.png"))?;
-        let normals = Normals::<YUp>::read(&folder.join("normal.png"))?;
+        let normals = Normals::read(&folder.join("normal.png"))?;
         let albedo = Rgb::<Linear>::read(&folder.join("albedo.png"), Transfer::Linear)?;
         let gloss = Gloss::even(normals.extent(), entry.reflectance, entry.smoothness);
         Ok(Object {

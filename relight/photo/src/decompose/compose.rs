@@ -2,7 +2,7 @@
 
 use super::encoding::PredictedMaps;
 use relight_core::image::Planes;
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 /// How much the albedo follows the network's own where there is little light: what is added to the
 /// square of the shading, whose mean is 1.
@@ -12,7 +12,7 @@ const RIDGE: f64 = 0.1;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ComposedLayers {
     /// The network's normals.
-    pub(super) normals: Normals<YUp>,
+    pub(super) normals: Normals,
     /// R.
     pub(super) albedo: Planes<3>,
     /// S, mean 1 under the mask of the whole picture.

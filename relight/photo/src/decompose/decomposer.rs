@@ -9,7 +9,7 @@ use super::network_output::{MapNetwork, PhotoPrediction, Scales, to_maps};
 use super::tiled_compose::{LayerPlan, MapUpscaler};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, ShLight};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 use relit_data::image_stats::SATURATED_VALUE;
@@ -66,7 +66,7 @@ impl Default for DecomposeOptions {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decomposition {
     /// The normals.
-    pub normals: Normals<YUp>,
+    pub normals: Normals,
     /// The albedo R, in such units that the mean shading is 1.
     pub albedo: Rgb<Linear>,
     /// The shading S, grey, mean 1 under the mask.

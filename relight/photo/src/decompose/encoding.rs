@@ -3,7 +3,7 @@
 
 use crate::nets::{INPUTS, OUTPUTS};
 use relight_core::image::{Extent, Planes};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relit_data::statistics::above_part;
 
 /// Part of the pixels that are darker than the encoded picture's white.
@@ -31,7 +31,7 @@ pub struct NetworkInput {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictedMaps {
     /// Unit normals.
-    pub normals: Normals<YUp>,
+    pub normals: Normals,
     /// Linear albedo, 0..1, right up to a factor.
     pub albedo: Planes<3>,
     /// Shading, grey, right up to a factor.

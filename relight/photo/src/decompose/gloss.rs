@@ -1,7 +1,7 @@
 //! The gloss of a whole object out of its highlight: s_p and alpha of the render layers' lobe.
 
 use relight_core::image::{ImageError, Planes};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, ShLight};
 use relight_core::render::{Gloss, LobeLayer};
 
 /// The smoothnesses that are tried.
@@ -26,7 +26,7 @@ pub struct FittedGloss {
 /// the light explains.
 pub fn fit_gloss(
     light: &ShLight,
-    normals: &Normals<YUp>,
+    normals: &Normals,
     highlight: &Planes<1>,
 ) -> Result<Option<FittedGloss>, ImageError> {
     let layer = LobeLayer::new(light);

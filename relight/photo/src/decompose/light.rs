@@ -2,7 +2,7 @@
 
 use crate::nets::LIGHT_OUTPUTS;
 use relight_core::image::{Linear, Rgb};
-use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
+use relight_core::light::{LightError, Normals, Order, ShLight};
 use relight_core::render::{cosine_lobe, fit_light_near};
 
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light_near`].
@@ -71,7 +71,7 @@ impl PredictedLight {
 /// The light of a shading, grey and of mean 1: the nearest one by least squares, regularised towards the network's
 /// prediction, if it gives one. The stiffness grows while the light is too one-sided to exist.
 pub(super) fn light_of_shading(
-    normals: &Normals<YUp>,
+    normals: &Normals,
     shading: &Rgb<Linear>,
     known: &[bool],
     predicted: Option<&PredictedLight>,

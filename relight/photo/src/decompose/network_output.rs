@@ -7,7 +7,7 @@ use super::encoding::{MIN_FACING, NetworkInput, PredictedMaps};
 use super::light::PredictedLight;
 use crate::nets::{Inference, NetError};
 use relight_core::image::{Extent, ImageError, Part, Planes};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relight_core::parallel;
 
 /// A network that predicts the maps of a picture of `side` x `side` pixels.
@@ -174,7 +174,7 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<PredictedMaps
 }
 
 /// The same normals; where two predictions cancelled out, the neighbour's.
-fn without_gaps(normals: Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
+fn without_gaps(normals: Normals, mask: &[bool]) -> Normals {
     let [x, y, z] = normals.planes().planes();
     let is_gap = |at: usize| mask[at] && (x[at], y[at], z[at]) == (0.0, 0.0, 0.0);
     if (0..mask.len()).any(is_gap) {

@@ -4,7 +4,7 @@ use super::network_output::{MapNetwork, NetworkOutput, predict, to_maps};
 use super::*;
 use crate::nets::{INPUTS, LIGHT_PARAMETERS, OUTPUTS, Weights, decomposer, decomposer_with_heads};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 /// Answers pixel by pixel, from the encoded values of the pixel.
 fn pixel_net(
@@ -141,12 +141,12 @@ fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
     let both = Decomposer::from_nets(fine(), Some(coarse));
     let normals = |net: &Decomposer| net.decompose(&lines, &mask, &options).unwrap().normals;
     let (one, both) = (normals(&one), normals(&both));
-    let mean_x = |of: &Normals<YUp>| {
+    let mean_x = |of: &Normals| {
         let sum: f32 = of.planes().plane(0).iter().sum();
         sum / mask.plane(0).iter().sum::<f32>()
     };
     assert!(mean_x(&one) > 0.3 && mean_x(&both) < -0.3, "the shape");
-    let step = |of: &Normals<YUp>| {
+    let step = |of: &Normals| {
         let x = |column| of.planes().pixel(column, 32)[0];
         (30..34)
             .map(|at| (x(at + 1) - x(at)).abs())

@@ -3,7 +3,7 @@
 use std::f32::consts::{PI, SQRT_2};
 
 use relight_core::image::{Extent, beside, connected_parts};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 use crate::relighting::HeightSolver;
 
@@ -17,7 +17,7 @@ const ROUNDS: usize = 4;
 ///
 /// # Panics
 /// Where `inside` is not as long as the map has pixels.
-pub(super) fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
+pub(super) fn integrated(normals: &Normals, inside: &[bool]) -> Vec<f32> {
     let extent = normals.extent();
     assert_eq!(inside.len(), extent.pixels());
     let longest = extent.width.max(extent.height);
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn parts_that_do_not_touch_stand_on_the_same_ground() {
         let extent = Extent::new(21, 8);
-        let normals = Normals::<YUp>::new(Planes::from_fn(extent, |x, _| {
+        let normals = Normals::new(Planes::from_fn(extent, |x, _| {
             if x < 10 {
                 [0.6, 0.0, 0.8]
             } else {

@@ -10,7 +10,7 @@ use exr::prelude::{
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ImageError, Planes};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 use super::heights::integrated;
 use super::not_encoded;
@@ -92,7 +92,7 @@ fn heights(object: &CapturedObject) -> Vec<f32> {
         .iter()
         .map(|&alpha| alpha >= 0.5)
         .collect();
-    let normals = Normals::<YUp>::new(object.surface().normals().planes().resized(grid));
+    let normals = Normals::new(object.surface().normals().planes().resized(grid));
     let found = integrated(&normals.completed(&inside), &inside);
     let scale = extent.width as f32 / grid.width as f32;
     match Planes::from_planes(grid, [found]) {

@@ -2,7 +2,7 @@
 
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, ImageError, Planes};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 use super::heights::integrated;
 
@@ -55,7 +55,7 @@ fn grid_mesh(object: &CapturedObject, side: usize) -> ObjectMesh {
     let grid = Extent::new(cells(picture.width), cells(picture.height));
     let alpha = object.alpha().resized(grid);
     let inside: Vec<bool> = alpha.plane(0).iter().map(|&alpha| alpha >= 0.5).collect();
-    let normals = Normals::<YUp>::new(object.surface().normals().planes().resized(grid));
+    let normals = Normals::new(object.surface().normals().planes().resized(grid));
     let normals = normals.completed(&inside);
 
     let mut triangles: Vec<[u32; 3]> = Vec::new();

@@ -6,7 +6,7 @@ use std::path::Path;
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::read_planes;
 use relight_core::image::{ImageError, Planes, Rgb, Transfer};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relight_core::render::{Gloss, Surface};
 use serde::Deserialize;
 
@@ -81,7 +81,7 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ImageError>
     }
     let (mask, _) = read_planes(&folder.join("mask.png"))?;
     let alpha = Planes::from_planes(mask.extent(), [mask.plane(0).to_vec()])?;
-    let normals = Normals::<YUp>::read(&folder.join("normal.png"))?;
+    let normals = Normals::read(&folder.join("normal.png"))?;
     let albedo = Rgb::read(&folder.join("albedo.png"), Transfer::Srgb)?;
     let albedo = Rgb::new(albedo.into_planes().map(|value| value * white));
     let extent = normals.extent();

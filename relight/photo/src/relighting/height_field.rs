@@ -1,7 +1,7 @@
 //! The shape of an object out of its normals, as far as its shadow needs it. Knows nothing of light.
 
 use relight_core::image::{Extent, Planes, beside};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 /// The longest side of the grid on which heights are found, cells.
 const MAX_SIDE: usize = 72;
@@ -46,7 +46,7 @@ impl HeightField {
     /// The shape whose normals these are, where alpha is at least one half; `None` if it is less everywhere.
     ///
     /// Heights are those whose differences from cell to cell are nearest to the slopes that the normals have, by least squares.
-    pub(crate) fn new(normals: &Normals<YUp>, alpha: &Planes<1>) -> Option<Self> {
+    pub(crate) fn new(normals: &Normals, alpha: &Planes<1>) -> Option<Self> {
         let picture = normals.extent();
         let longest = picture.width.max(picture.height);
         let scale = (MAX_SIDE as f64 / longest as f64).min(1.0);
@@ -61,7 +61,7 @@ impl HeightField {
         if !inside.contains(&true) {
             return None;
         }
-        let vectors = Normals::<YUp>::new(normals.planes().resized(extent)).completed(&inside);
+        let vectors = Normals::new(normals.planes().resized(extent)).completed(&inside);
         let solver = HeightSolver {
             least_facing: MIN_FACING,
             relaxation: RELAXATION,
@@ -228,7 +228,7 @@ pub(crate) struct HeightSolver {
 impl HeightSolver {
     /// Heights of the cells inside, in cells, up to a constant; 0 elsewhere. Their differences from cell to cell are nearest to
     /// the slopes of the normals, by least squares.
-    pub(crate) fn heights(&self, normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
+    pub(crate) fn heights(&self, normals: &Normals, inside: &[bool]) -> Vec<f32> {
         let extent = normals.extent();
         let [x, y, z] = normals.planes().planes();
         let slope = |at: usize| {
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn what_faces_the_viewer_is_thin_and_nothing_has_no_shape() {
         let extent = Extent::new(50, 80);
-        let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let flat = Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
         let relief = HeightField::new(&flat, &Planes::filled(extent, [1.0])).unwrap();
         assert!(relief.half.iter().all(|&half| half == MIN_THICKNESS));
         assert!(HeightField::new(&flat, &Planes::zeros(extent)).is_none());
@@ -302,7 +302,7 @@ mod tests {
     /// A table with two legs, the right one eight rows shorter, and an arm that ends far above.
     fn table() -> HeightField {
         let extent = Extent::new(60, 60);
-        let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let flat = Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
         let alpha = Planes::from_fn(extent, |x, y| {
             let end = match x {
                 2..6 => 14,

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use super::height_field::HeightField;
 use super::placement::{Fit, Foot};
 use relight_core::image::Planes;
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 /// An object as it stands, without its colours.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl PlacedObject {
     }
 
     /// The shape of the object whose own normals these are; `None` if it covers no pixel by a half.
-    pub(crate) fn height_field(&self, normals: &Normals<YUp>) -> Option<&HeightField> {
+    pub(crate) fn height_field(&self, normals: &Normals) -> Option<&HeightField> {
         if self.height_field.get().is_none() {
             // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.
             let _ = self.height_field.set(self.new_height_field(normals));
@@ -38,14 +38,14 @@ impl PlacedObject {
         self.height_field.get()?.as_ref()
     }
 
-    fn new_height_field(&self, normals: &Normals<YUp>) -> Option<HeightField> {
+    fn new_height_field(&self, normals: &Normals) -> Option<HeightField> {
         let mut turned = self.fit.apply(normals.planes());
         let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
         let [x, y, _] = turned.planes_mut();
         for (x, y) in x.iter_mut().zip(y) {
             [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
         }
-        HeightField::new(&Normals::<YUp>::new(turned), &self.alpha)
+        HeightField::new(&Normals::new(turned), &self.alpha)
     }
 }
 

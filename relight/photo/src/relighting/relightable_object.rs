@@ -17,7 +17,7 @@ use crate::decompose::{
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::light::{Normals, Order, ShLight, YUp};
+use relight_core::light::{Normals, Order, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, LobeLayer, exposure_for};
 
 /// The most by which the residual of a pixel grows with the light.
@@ -53,7 +53,7 @@ pub struct RelightableObject {
     /// Of a photograph without alpha.
     pub(crate) fringe: Option<Fringe>,
     /// Also under the soft edge.
-    pub(crate) normals: Normals<YUp>,
+    pub(crate) normals: Normals,
     /// In units in which the mean shading is 1.
     albedo: Planes<3>,
     shading: Shading,
@@ -319,7 +319,7 @@ impl RelightableObject {
 
 /// Normals without what is finer than the network's pixels: a grid of them would show where light falls flat. Fine relief is in
 /// the shading.
-fn smoothed(normals: &Normals<YUp>, wanted: &[bool], side: usize) -> Normals<YUp> {
+fn smoothed(normals: &Normals, wanted: &[bool], side: usize) -> Normals {
     let radius = (side as f64 / WORKING_SIDE as f64).round() as usize;
     let weights = wanted.iter().map(|&w| f32::from(u8::from(w))).collect();
     match Planes::from_planes(normals.extent(), [weights]) {
@@ -349,11 +349,7 @@ fn mean_gloss(gloss: &Gloss, covered: &[usize]) -> ObjectGloss {
     }
 }
 
-fn lobes(
-    light: &ShLight,
-    normals: &Normals<YUp>,
-    gloss: ObjectGloss,
-) -> Result<Planes<3>, InsertError> {
+fn lobes(light: &ShLight, normals: &Normals, gloss: ObjectGloss) -> Result<Planes<3>, InsertError> {
     let even = Gloss::even(normals.extent(), gloss.reflectance, gloss.smoothness);
     Ok(LobeLayer::new(light)
         .highlight(normals, &even)?

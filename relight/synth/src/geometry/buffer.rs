@@ -6,7 +6,7 @@ use super::raster::{NOTHING, Projected, Triangle, Weights, nearest_triangles};
 use crate::mesh::{Mesh, SurfaceSample, blended};
 use crate::view::Projection;
 use relight_core::image::{Extent, Planes};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 
 /// How far above the surface rays of light start: the object is about 1 large.
 const LIFT: f32 = 1e-3;
@@ -117,7 +117,7 @@ impl GBuffer {
     }
 
     /// These normals as a map.
-    pub fn normal_map(&self, normals: &[Vec3]) -> Normals<YUp> {
+    pub fn normal_map(&self, normals: &[Vec3]) -> Normals {
         Normals::new(self.planes(normals))
     }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::lamp::{LampShadows, SyntheticLamp, turn};
 use crate::geometry::GBuffer;
 use relight_core::image::{Extent, Planes};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 
 /// The material at the covered pixels of a buffer.
@@ -155,7 +155,7 @@ fn irradiance(normals: &[Vec3], light: &ShLight) -> Vec<Vec3> {
         return vec![Vec3::ZERO; normals.len()];
     };
     let layer = DiffuseLayer::new(light, DiffuseForm::Irradiance);
-    let shading = layer.shading(&Normals::<YUp>::new(planes)).into_planes();
+    let shading = layer.shading(&Normals::new(planes)).into_planes();
     let [r, g, b] = shading.planes();
     let channels = r.iter().zip(g).zip(b);
     channels.map(|((&r, &g), &b)| Vec3::new(r, g, b)).collect()

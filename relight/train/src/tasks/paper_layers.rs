@@ -148,7 +148,7 @@ mod tests {
         Tensor::from_slice(&flat).view([1, 9, 3])
     }
 
-    fn sphere() -> (Tensor, Tensor, Normals<relight_core::light::YUp>) {
+    fn sphere() -> (Tensor, Tensor, Normals) {
         let normals = Normals::sphere(SIDE);
         let planes: Vec<f32> = normals.planes().planes().concat();
         let tensor = Tensor::from_slice(&planes).view([1, 3, SIDE as i64, SIDE as i64]);

@@ -105,7 +105,7 @@ mod tests {
     use crate::{Elevation, ProbePlace};
     use relight_core::image::{ColourSpace, Extent, Srgb};
     use relight_core::light::Rotation;
-    use relight_core::light::{Direction, Order, YUp, basis};
+    use relight_core::light::{Direction, Order, basis};
     use relight_core::render::{DiffuseForm, DiffuseLayer};
     use std::f64::consts::FRAC_1_PI;
 
@@ -143,7 +143,7 @@ mod tests {
     /// Films a ball that shows of a light what `shown` says, pixel by pixel.
     fn measure(
         ball: Option<ProbeBall>,
-        shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,
+        shown: impl Fn(&ShLight, &Normals) -> Planes<3>,
     ) -> ProbeLight {
         try_measure(probe(ball), shown).unwrap()
     }
@@ -151,7 +151,7 @@ mod tests {
     /// The same for a ball at another given place.
     fn try_measure(
         probe: Probe,
-        shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,
+        shown: impl Fn(&ShLight, &Normals) -> Planes<3>,
     ) -> Result<ProbeLight, TurnError> {
         let mut builder = ProbeBuilder::new(probe);
         let normals = Normals::sphere(60);
@@ -175,12 +175,12 @@ mod tests {
         builder.finish()
     }
 
-    fn grey(light: &ShLight, normals: &Normals<YUp>) -> Planes<3> {
+    fn grey(light: &ShLight, normals: &Normals) -> Planes<3> {
         let shading = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(normals);
         shading.into_planes().map(|v| 0.2 * v)
     }
 
-    fn chrome(light: &ShLight, normals: &Normals<YUp>) -> Planes<3> {
+    fn chrome(light: &ShLight, normals: &Normals) -> Planes<3> {
         Planes::from_fn(normals.extent(), |x, y| {
             let normal = normals.planes().pixel(x, y).map(f64::from);
             let [x, y, z] = reflected(normal);
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_ball_beside_its_place_is_refused_with_where_it_is() {
-        type Shown = fn(&ShLight, &Normals<YUp>) -> Planes<3>;
+        type Shown = fn(&ShLight, &Normals) -> Planes<3>;
         for (ball, shown) in [
             (ProbeBall::Grey, grey as Shown),
             (ProbeBall::Chrome, chrome as Shown),
@@ -278,7 +278,7 @@ mod tests {
     #[test]
     fn what_is_no_ball_is_refused() {
         // A board that leans to the camera.
-        let flat = |light: &ShLight, normals: &Normals<YUp>| {
+        let flat = |light: &ShLight, normals: &Normals| {
             let board = Planes::filled(normals.extent(), [0.0, 0.6, 0.8]);
             grey(light, &Normals::new(board))
         };

@@ -1,7 +1,7 @@
 //! Normals, albedo and light of a solved turn.
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
+use relight_core::light::{LightError, Normals, Order, ShLight};
 use relit_data::statistics::median;
 
 use crate::model::frame::Elevation;
@@ -34,7 +34,7 @@ pub struct TurnSolution {
 
 impl TurnSolution {
     /// The normals in the viewer's frame.
-    pub fn normals(&self, curves: &TurnCurves) -> Normals<YUp> {
+    pub fn normals(&self, curves: &TurnCurves) -> Normals {
         Normals::new(curves.map(|pixel| self.normals[pixel].map(|v| v as f32)))
     }
 

@@ -1,7 +1,7 @@
 //! Normals and albedo of a turn by the network, in unknown light.
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::{Normals, YUp};
+use relight_core::light::Normals;
 use relight_photo::nets::{Inference, NetError, Weights, turn_network};
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct TurnNetwork {
 #[derive(Debug, Clone)]
 pub(crate) struct TurnPrediction {
     /// Unit normals under the mask.
-    pub(crate) normals: Normals<YUp>,
+    pub(crate) normals: Normals,
     /// By how much each is expected to be off, degrees; 0 outside the mask.
     pub(crate) expected_errors: Planes<1>,
     /// Albedo, each channel in a unit of its own.

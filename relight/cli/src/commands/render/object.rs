@@ -8,7 +8,7 @@ use relight_core::files::read_planes;
 use relight_core::image::{
     Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage, Transfer, check_extent,
 };
-use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
+use relight_core::light::{Normals, NormalsFrame};
 use relight_core::render::{Gloss, Surface};
 use relight_photo::export::read_object;
 
@@ -72,15 +72,15 @@ impl ObjectArguments {
         Ok(Surface::new(normals, albedo, gloss)?)
     }
 
-    fn read_normals(&self) -> Result<Normals<YUp>, Box<dyn Error>> {
+    fn read_normals(&self) -> Result<Normals, Box<dyn Error>> {
         let Some(path) = &self.normals else {
             return Err(
                 "give an object (object.relit, or a folder of relight turn or relight decompose), or --normals".into(),
             );
         };
         let normals = match self.normals_frame.normals_y {
-            NormalsFrame::YUp => Normals::<YUp>::read(path)?,
-            NormalsFrame::YDown => Normals::<YDown>::read(path)?.flipped(),
+            NormalsFrame::YUp => Normals::read(path)?,
+            NormalsFrame::YDown => Normals::read(path)?.flipped(),
         };
         let normals = match &self.mask {
             None => normals,
@@ -175,7 +175,7 @@ mod tests {
             write_png(&path, &Planes::filled(extent, value), Depth::Eight).unwrap();
             path
         };
-        let normals = Normals::<YDown>::new(Planes::filled(extent, [0.0, 0.6, 0.8]));
+        let normals = Normals::new(Planes::filled(extent, [0.0, 0.6, 0.8]));
         let path = folder.join("normal.png");
         normals.write_png(&path, Depth::Sixteen).unwrap();
         ObjectArguments {

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::{DamagedSample, ReadError};
 use crate::image::{Extent, Linear, Planes, Rgb};
-use crate::light::{Normals, ShLight, YUp};
+use crate::light::{Normals, ShLight};
 use layout::Entry;
 
 pub use layout::TruthLayout;
@@ -25,7 +25,7 @@ pub struct TruthSample {
     /// The same without highlights: albedo times shading.
     pub diffuse: Option<Rgb<Linear>>,
     /// Normals, where they are known.
-    pub normals: Option<Normals<YUp>>,
+    pub normals: Option<Normals>,
     /// The diffuse reflectance, up to a scale.
     pub albedo: Option<Rgb<Linear>>,
     /// The light that falls on the surface, up to a scale.

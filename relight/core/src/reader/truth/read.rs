@@ -10,7 +10,7 @@ use super::TruthSample;
 use super::layout::{Entry, Part, Role, TruthLayout};
 use crate::files::read_planes;
 use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};
-use crate::light::{Normals, ShLight, YDown, YUp};
+use crate::light::{Normals, ShLight};
 use crate::reader::ReadError;
 use relit_data::text;
 
@@ -91,10 +91,10 @@ impl Parts<'_> {
         part.map(|part| part.path.as_path())
     }
 
-    fn normals(&self) -> Result<Option<Normals<YUp>>, ReadError> {
+    fn normals(&self) -> Result<Option<Normals>, ReadError> {
         let normals = self.read(Role::Normals, |path| match self.layout {
             TruthLayout::Janner => read_turned_normals(path),
-            _ => Normals::<YUp>::read(path),
+            _ => Normals::read(path),
         })?;
         match (normals, self.binary(Role::NormalsValid)?) {
             (Some(normals), Some(valid)) => only_where(&normals, &valid).map(Some),
@@ -159,16 +159,16 @@ fn product(
 }
 
 /// Normals whose red is y down and whose green is x.
-fn read_turned_normals(path: &Path) -> Result<Normals<YUp>, ImageError> {
+fn read_turned_normals(path: &Path) -> Result<Normals, ImageError> {
     let (colours, _) = read_planes(path)?;
     let extent = colours.extent();
     let [down, right, viewer] = colours.into_planes();
     let colours = Planes::from_planes(extent, [right, down, viewer])?;
-    Ok(Normals::<YDown>::from_colours(colours).flipped())
+    Ok(Normals::from_colours(colours).flipped())
 }
 
 /// The normals without those where `valid` is 0.
-fn only_where(normals: &Normals<YUp>, valid: &Planes<1>) -> Result<Normals<YUp>, ReadError> {
+fn only_where(normals: &Normals, valid: &Planes<1>) -> Result<Normals, ReadError> {
     check_extent("map of valid normals", valid.extent(), normals.extent())?;
     let planes = normals.planes().clone();
     Ok(Normals::new(
