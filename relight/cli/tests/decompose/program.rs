@@ -109,11 +109,6 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             2,
             "contains none",
         ),
-        (
-            "weights export w.safetensors -o ./w.safetensors",
-            1,
-            "./w.safetensors",
-        ),
     ] {
         let (found, errors) = code_and_errors(&relight(&folder, command));
         assert_eq!(found, code, "{command}: {errors}");
@@ -140,9 +135,6 @@ fn the_weights_that_come_with_the_program_are_exported() {
         let found = size(&format!("{net}.onnx"));
         assert!((4_000_000..most).contains(&found), "{net}: {found}");
     }
-    let command = "weights export --single -o single.onnx";
-    assert_eq!(code_and_errors(&relight(&folder, command)).0, 0);
-    assert!(size("single.onnx") > 30_000_000);
 }
 
 #[test]
