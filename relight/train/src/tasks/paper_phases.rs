@@ -23,15 +23,13 @@ use crate::data::sample::TruthBatch;
 use crate::data::turn_reader::TurnTensors;
 use crate::engine::losses::{Mean, angular, scale_invariant};
 use crate::engine::model::Model;
-use crate::engine::tensors::{grey, over_channels};
+use crate::engine::tensors::over_channels;
 use crate::error::TrainError;
 
 /// Least diffuse light, so that its chromaticity exists.
 const DARKEST: f64 = 1e-5;
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
-/// Shading below this is not divided by.
-const MIN_SHADING: f64 = 0.02;
 
 /// Spec-Net's highlight, linear, 3 channels of 0..=1.
 ///
@@ -167,11 +165,17 @@ pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Mean
 /// [`TrainError::Torch`].
 pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<Mean, TrainError> {
     let coefficients = light_of(light, &diffuse_of_truth(batch), &batch.mask)?;
-    let shading = diffuse_shading(&batch.normals, &coefficients);
-    let grey = grey(&shading);
-    let value = scale_invariant(&grey, &batch.shading, &batch.mask);
+    let value = shading_error(&coefficients, batch);
     let over = Tensor::from_slice(&[batch.mask.size()[0]]);
     Ok(Mean { value, over })
+}
+
+/// Scale-invariant error of each channel's shading: of their mean alone, one channel's light could be negative.
+fn shading_error(coefficients: &Tensor, batch: &TruthBatch) -> Tensor {
+    let shading = diffuse_shading(&batch.normals, coefficients);
+    let thrice = |of: &Tensor| of.repeat_interleave_self_int(3, 0, None);
+    let (truth, mask) = (thrice(&batch.shading), thrice(&batch.mask));
+    scale_invariant(&shading.flatten(0, 1).unsqueeze(1), &truth, &mask)
 }
 
 /// Low-rank loss of the reflectance.
@@ -188,7 +192,8 @@ pub(crate) fn reflectance_on_turns(
     Ok(low_rank(&reflectance, &turns.mask))
 }
 
-/// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light.
+/// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light. Not
+/// clipped, as light that is dark enough would make all of it 1, and its rank one.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -205,8 +210,7 @@ pub(crate) fn reflectance(
     };
     let normals = normals_of(normal, &diffuse, mask)?;
     let coefficients = light_of(light, &diffuse, mask)?;
-    let shading = diffuse_shading(&normals, &coefficients);
-    Ok((&diffuse / shading.clamp_min(MIN_SHADING)).clamp(0.0, 1.0))
+    Ok(&diffuse / diffuse_shading(&normals, &coefficients))
 }
 
 /// The pictures without Spec-Net's highlights, where the gate is open for them: what Normal-Net and Light-Net are given.
@@ -365,20 +369,57 @@ mod tests {
         assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");
     }
 
-    #[test]
-    fn composed_samples_teach_normals_of_the_picture_without_its_highlights() {
-        let normal = model(normal_net(), 1);
+    /// Two samples of white paper that faces the viewer.
+    fn flat_batch() -> TruthBatch {
         let place = (Kind::Float, Device::Cpu);
         let ones = || Tensor::ones([2, 1, SIDE, SIDE], place);
-        let batch = |picture: Tensor, highlight: Tensor| TruthBatch {
+        TruthBatch {
             input: Tensor::zeros([2, 4, SIDE, SIDE], place),
             mask: ones(),
-            picture,
+            picture: Tensor::ones([2, 3, SIDE, SIDE], place),
             shading: ones(),
             albedo: Tensor::ones([2, 3, SIDE, SIDE], place),
             normals: Tensor::cat(&[ones() * 0.0, ones() * 0.0, ones()], 1),
-            highlight,
+            highlight: ones() * 0.0,
             light: Tensor::zeros([2, 9], place),
+        }
+    }
+
+    #[test]
+    fn light_of_a_negative_colour_is_wrong_though_the_mean_of_the_colours_is_right() {
+        let place = (Kind::Float, Device::Cpu);
+        let across = Tensor::linspace(-0.7, 0.7, SIDE, place);
+        let x = across
+            .view([1, 1, 1, SIDE])
+            .expand([2, 1, SIDE, SIDE], true)
+            .copy();
+        let depth = (x.square() * -1.0 + 1.0).sqrt();
+        let normals = Tensor::cat(&[&x, &(&x * 0.0), &depth], 1);
+        let light = |colour: [f32; 3]| {
+            let bands = Tensor::from_slice(&[1.0_f32, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            let one = bands.view([1, 9, 1]) * Tensor::from_slice(&colour).view([1, 1, 3]);
+            one.expand([2, 9, 3], true).copy()
+        };
+        let white = light([1.0; 3]);
+        let shading = diffuse_shading(&normals, &white);
+        let batch = TruthBatch {
+            shading: shading.narrow(1, 0, 1),
+            normals,
+            ..flat_batch()
+        };
+        let error = |light: &Tensor| shading_error(light, &batch).double_value(&[]);
+        let (right, wrong) = (error(&white), error(&light([5.0, -1.0, -1.0])));
+        assert!(right < 1e-6 && wrong > 0.01, "{right} {wrong}");
+    }
+
+    #[test]
+    fn composed_samples_teach_normals_of_the_picture_without_its_highlights() {
+        let normal = model(normal_net(), 1);
+        let ones = || Tensor::ones([2, 1, SIDE, SIDE], (Kind::Float, Device::Cpu));
+        let batch = |picture: Tensor, highlight: Tensor| TruthBatch {
+            picture,
+            highlight,
+            ..flat_batch()
         };
         let loss = |batch: &TruthBatch| {
             let loss = normal_on_truth(&normal, batch).unwrap();
