@@ -28,7 +28,7 @@ pub enum MaskError {
     },
     /// The background does not show where the object is.
     #[error(
-        "the object cannot be found by its background ({why}): give a rectangle around the object"
+        "the object cannot be found by its background ({why}): give a rectangle around the object, --rect X,Y,W,H"
     )]
     NotPlain {
         /// What is not plain about it, of "it", the background.

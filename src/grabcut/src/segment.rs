@@ -29,6 +29,10 @@ const REACHES: f64 = 0.04;
 /// By how much a cut has to be better than that of GrabCut's own start where that reaches all sides of the rectangle, in
 /// units of the log-likelihood of a pixel.
 const MARGIN: f64 = 0.2;
+/// What is near a rectangle is within this share of its longer side.
+const NEAR: f64 = 0.8;
+/// And what is very near within this.
+const VERY_NEAR: f64 = 0.2;
 /// An object covers at least this share of its rectangle.
 const LEAST_OF_RECT: f64 = 0.18;
 /// And what is kept of a cut is at least this share of it: a cut in many small pieces is none.
@@ -230,11 +234,12 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
 }
 
 /// The cut by hints alone. With a rectangle there are two starts: GrabCut's way, with all of it as object, and with the
-/// share of it as background that looks most like what is around it.
+/// share of it as background that looks most like what is around it. Models learn from what is near the rectangle, for
+/// the first start also from what is very near: that shows best what is in the rectangle, but least of all colours.
 ///
 /// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
-/// rectangle and is in places like what is around it. So the cut of the lower energy counts. Where that of GrabCut's
-/// own start reaches all four sides of its rectangle, as the object of a tight one does, the other has to be better by
+/// rectangle and is in places like what is around it. So the cut of the lowest energy counts. Where one of GrabCut's
+/// own start reaches all four sides of its rectangle, as the object of a tight one does, others have to be better by
 /// a margin. A cut whose size or pieces are not those of an object has a low energy too, because it says little: then
 /// others count, and a warning says so.
 fn by_hints(
@@ -250,45 +255,62 @@ fn by_hints(
         first,
         rect,
     } = initial(hints, size)?;
-    let cut = |labels: Vec<Label>, first: InitialModels| {
-        let raw = pyramid::segment(frame, labels, first, effort)?;
+    let cut = |labels: Vec<Label>, first: InitialModels, sampled: Option<Rect>| {
+        let raw = pyramid::segment(frame, labels, first, sampled, effort)?;
         Ok(finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME))
     };
     let Some(rect) = rect else {
-        return cut(labels, first);
+        return cut(labels, first, None);
     };
     let energy = CutEnergy::new(frame, rect);
     let energy = |mask: &Mask| energy.of(&Bitmap::from_mask(&mask.image));
-    let (chosen, other) = match (
-        cut(labels.clone(), InitialModels::All),
-        cut(labels.clone(), first),
-    ) {
-        (Ok(plain), Ok(ranked)) => {
-            let fills = fills(plain.statistics.bounding_box, rect);
-            let margin = if fills { MARGIN } else { 0.0 };
-            if energy(&plain) - energy(&ranked) <= margin {
-                (plain, Some(ranked))
-            } else {
-                (ranked, Some(plain))
+    let all = InitialModels::All;
+    let starts = [(all, VERY_NEAR), (all, NEAR), (first, NEAR)];
+    let cut_near = |labels, first, share| cut(labels, first, Some(surroundings(rect, size, share)));
+    let mut cuts = Vec::new();
+    let mut failed = None;
+    for (first, share) in starts {
+        match cut_near(labels.clone(), first, share) {
+            Ok(mask) => {
+                let fills = first == all && fills(mask.statistics.bounding_box, rect);
+                cuts.push((energy(&mask) - if fills { MARGIN } else { 0.0 }, mask));
             }
+            Err(error) => failed = failed.or(Some(error)),
         }
-        (plain, ranked) => (plain.or(ranked)?, None),
-    };
-    if is_plausible(&chosen, rect) {
-        return Ok(chosen);
     }
-    let middle = in_ellipse(&labels, rect, size.0);
-    let more = [
-        cut(labels, InitialModels::Ranked(OTHER_SHARE)),
-        cut(middle, InitialModels::All),
-    ];
-    let others = other.into_iter().chain(more.into_iter().flatten());
-    let best = others
-        .filter(|mask| is_plausible(mask, rect))
-        .min_by(|a, b| energy(a).total_cmp(&energy(b)));
-    let mut mask = best.unwrap_or(chosen);
-    mask.warnings.push(IMPLAUSIBLE.to_owned());
-    Ok(mask)
+    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let best = cuts.first();
+    if best.is_some_and(|(_, mask)| !is_plausible(mask, rect)) {
+        let middle = in_ellipse(&labels, rect, size.0);
+        let more = [
+            cut_near(labels, InitialModels::Ranked(OTHER_SHARE), NEAR),
+            cut_near(middle, all, NEAR),
+        ];
+        let more = more.into_iter().flatten();
+        cuts.extend(more.map(|mask| (energy(&mask), mask)));
+        let plausible = cuts
+            .iter()
+            .enumerate()
+            .filter(|(_, (_, mask))| is_plausible(mask, rect));
+        let best = plausible.min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let mut mask = cuts.swap_remove(best.map_or(0, |(at, _)| at)).1;
+        mask.warnings.push(IMPLAUSIBLE.to_owned());
+        return Ok(mask);
+    }
+    let best = cuts.into_iter().next().map(|(_, mask)| mask);
+    best.ok_or(failed.unwrap_or(MaskError::Empty))
+}
+
+/// A rectangle with what is around it within a share of its longer side, in the frame.
+fn surroundings(rect: Rect, (width, height): (u32, u32), share: f64) -> Rect {
+    let around = (f64::from(rect.w.max(rect.h)) * share) as u32;
+    let grown = Rect::new(
+        rect.x.saturating_sub_unsigned(around),
+        rect.y.saturating_sub_unsigned(around),
+        rect.w.saturating_add(2 * around),
+        rect.h.saturating_add(2 * around),
+    );
+    grown.clipped_to(width, height).unwrap_or(rect)
 }
 
 /// Whether a cut is an object by its size and its pieces.

@@ -32,7 +32,7 @@ pub enum MaskingError {
     Handmade(PathBuf),
     /// The mask that is there is that of another recording.
     #[error(
-        "{mask} is the mask of another input, {input}: give another name with -o, or --force to replace it"
+        "{mask} was made of another input, whose file is called {input}: give another name with -o, or --force to replace it"
     )]
     OtherInput {
         /// The mask.

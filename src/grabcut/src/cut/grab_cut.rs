@@ -93,6 +93,10 @@ pub(crate) trait Field<const D: usize> {
     fn evidence(&self, _at: usize) -> f32 {
         0.0
     }
+    /// Whether the models learn from a pixel.
+    fn is_sampled(&self, _at: usize) -> bool {
+        true
+    }
 }
 
 /// The colour models of both sides.
@@ -357,7 +361,7 @@ fn samples<const D: usize, F: Field<D>>(
     labels: &[Label],
     wanted: impl Fn(Label) -> bool,
 ) -> Vec<[f32; D]> {
-    let wanted = |&at: &usize| wanted(labels[at]);
+    let wanted = |&at: &usize| wanted(labels[at]) && field.is_sampled(at);
     let all = (0..labels.len()).filter(wanted).count();
     let step = all.div_ceil(MAX_SAMPLES).max(1);
     let taken = (0..labels.len()).filter(wanted).step_by(step);

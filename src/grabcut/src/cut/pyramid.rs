@@ -6,7 +6,9 @@
 use std::borrow::Cow;
 
 use image::{ImageBuffer, Pixel, RgbImage};
+use relit_data::geometry::Rect;
 
+use super::geodesic;
 use super::grab_cut;
 use super::grab_cut::{Field, IncrementalCut, Label, Models, SMOOTHNESS, squared_distance};
 use super::lab::LabTable;
@@ -28,7 +30,7 @@ pub(crate) enum InitialModels {
     /// From all pixels, after the given share of the probable object that is most like the sure
     /// background was set to probably background.
     Ranked(f64),
-    /// From the sure pixels alone.
+    /// From the sure pixels alone, with what is connected with them as evidence.
     Sure,
     /// From all pixels.
     All,
@@ -65,22 +67,27 @@ pub(crate) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Ve
     levels
 }
 
-/// Cuts the object out of `image`, with what is known of it.
+/// Cuts the object out of `image`, with what is known of it. Models learn from the pixels in `sampled`, or from all.
 pub(crate) fn segment(
     image: &RgbImage,
     known: Vec<Label>,
     first: InitialModels,
+    sampled: Option<Rect>,
     effort: Effort,
 ) -> Result<Bitmap, MaskError> {
     let table = LabTable::new();
+    let full = image.width();
     let mut finer = levels(image, known, COARSEST_PX);
     let Some(mut coarsest) = finer.pop() else {
         return Err(MaskError::Empty);
     };
     let size = coarsest.size();
-    let field = RgbField::converted(&coarsest.image, &table);
+    let mut field = RgbField::converted(&coarsest.image, &table).sampling(sampled, full);
+    if first == InitialModels::Sure {
+        field.evidence = geodesic::evidence(&field, &coarsest.labels);
+    }
     let mut models = begin_smooth(&field, &mut coarsest.labels, first)?;
-    let field = |_, image| RgbField::new(image, &table);
+    let field = |_, image| RgbField::new(image, &table).sampling(sampled, full);
     Ok(ascend(
         &finer,
         coarsest.labels,
@@ -257,19 +264,42 @@ pub(crate) struct RgbField<'a> {
     table: &'a LabTable,
     /// The colours where all of them are needed; empty where few are.
     lab: Vec<[f32; 3]>,
+    /// What else is known of the pixels; empty where that is nothing.
+    evidence: Vec<f32>,
+    /// The part from which models learn; `None` for all of it.
+    sampled: Option<Rect>,
 }
 
 impl<'a> RgbField<'a> {
     /// A large image; few of its pixels are needed.
     pub(crate) fn new(image: &'a RgbImage, table: &'a LabTable) -> Self {
-        let lab = Vec::new();
-        Self { image, table, lab }
+        Self {
+            image,
+            table,
+            lab: Vec::new(),
+            evidence: Vec::new(),
+            sampled: None,
+        }
     }
 
     /// A small image, its colours converted once.
     fn converted(image: &'a RgbImage, table: &'a LabTable) -> Self {
-        let lab = image.pixels().map(|pixel| table.lab(pixel.0)).collect();
-        Self { image, table, lab }
+        Self {
+            lab: image.pixels().map(|pixel| table.lab(pixel.0)).collect(),
+            ..Self::new(image, table)
+        }
+    }
+}
+
+impl RgbField<'_> {
+    /// With the part from which models learn, in pixels of an image that is `full` wide.
+    fn sampling(self, part: Option<Rect>, full: u32) -> Self {
+        let factor = full.div_ceil(self.image.width().max(1)).next_power_of_two();
+        let sampled = part.map(|Rect { x, y, w, h }| {
+            let by = factor.cast_signed();
+            Rect::new(x / by, y / by, w.div_ceil(factor), h.div_ceil(factor))
+        });
+        Self { sampled, ..self }
     }
 }
 
@@ -291,5 +321,14 @@ impl Field<3> for RgbField<'_> {
 
     fn contrast(&self, a: usize, b: usize) -> f32 {
         squared_distance(&self.feature(a), &self.feature(b))
+    }
+
+    fn evidence(&self, at: usize) -> f32 {
+        self.evidence.get(at).copied().unwrap_or(0.0)
+    }
+
+    fn is_sampled(&self, at: usize) -> bool {
+        self.sampled
+            .is_none_or(|part| part.contains(at, self.image.width()))
     }
 }
