@@ -36,11 +36,11 @@
 //!
 //! # How it decides
 //!
-//! With a rectangle, pixels outside are background; seeds overrule that. Two cuts are made: in one the half of the
-//! pixels inside that looks most like the outside starts as background too. The one with the lower energy counts. With seeds alone, the colours of the marked
-//! pixels decide first; if no background is marked, unmarked pixels start as probable background. Colour
-//! models of both sides and minimum cuts then take turns at a small size, and at each larger size a band
-//! along the edge is decided again.
+//! With a rectangle, pixels outside are background; seeds overrule that. Cuts from several starts are compared at a
+//! small size, among them one in which the half of the rectangle that looks most like what is around it starts as
+//! background. The one of the lowest energy counts. With seeds alone, the colours of the marked pixels decide first,
+//! and what is connected with them; if no background is marked, unmarked pixels start as probable background. Colour
+//! models of both sides and minimum cuts take turns, and at each larger size a band along the edge is decided again.
 //!
 //! With a turn, a pixel's colour is its average over the frames, how much it changes counts too, and
 //! neighbours that change together belong together. What equals the ends of its row is background: the

@@ -7,8 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::bitmap::{Bitmap, Component, Connectivity};
 use super::cut::energy::CutEnergy;
 use super::cut::grab_cut::Label;
-use super::cut::pyramid;
-use super::cut::pyramid::InitialModels;
+use super::cut::pyramid::{CoarseCut, InitialModels, Pyramid};
 use super::hints::trimap::Trimap;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
@@ -53,8 +52,6 @@ pub struct Mask {
     pub warnings: Vec<String>,
     /// Whether one of them names a hole that was filled.
     names_hole: bool,
-    /// The share of the cut that was kept in the clean-up.
-    kept_share: f64,
 }
 
 /// Numbers about a mask.
@@ -233,15 +230,7 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
     }
 }
 
-/// The cut by hints alone. With a rectangle there are two starts: GrabCut's way, with all of it as object, and with the
-/// share of it as background that looks most like what is around it. Models learn from what is near the rectangle, for
-/// the first start also from what is very near: that shows best what is in the rectangle, but least of all colours.
-///
-/// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
-/// rectangle and is in places like what is around it. So the cut of the lowest energy counts. Where one of GrabCut's
-/// own start reaches all four sides of its rectangle, as the object of a tight one does, others have to be better by
-/// a margin. A cut whose size or pieces are not those of an object has a low energy too, because it says little: then
-/// others count, and a warning says so.
+/// The cut by hints alone.
 fn by_hints(
     frame: &RgbImage,
     hints: &Hints,
@@ -255,68 +244,110 @@ fn by_hints(
         first,
         rect,
     } = initial(hints, size)?;
-    let cut = |labels: Vec<Label>, first: InitialModels, sampled: Option<Rect>| {
-        let raw = pyramid::segment(frame, labels, first, sampled, effort)?;
-        Ok(finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME))
+    let pyramid = Pyramid::new(frame, labels)?;
+    let (cut, is_plausible) = match rect {
+        Some(rect) => best_cut(&pyramid, rect, first, settings)?,
+        None => (
+            pyramid.cut(pyramid.coarsest().labels.clone(), first, None)?,
+            true,
+        ),
     };
-    let Some(rect) = rect else {
-        return cut(labels, first, None);
+    let raw = pyramid.refined(cut, effort);
+    let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME);
+    if !is_plausible {
+        mask.warnings.push(IMPLAUSIBLE.to_owned());
+    }
+    Ok(mask)
+}
+
+/// A coarse cut, and how it is judged.
+struct Candidate {
+    cut: CoarseCut,
+    /// The lower, the better.
+    energy: f64,
+    /// Whether it is an object by its size and its pieces.
+    is_plausible: bool,
+}
+
+/// The best of the coarse cuts in a rectangle, and whether the usual starts found an object.
+///
+/// There are three: GrabCut's own with all of the rectangle as object, twice, and one with the share of it as background
+/// that looks most like what is around it. Models learn from what is near the rectangle, in one of the first two only
+/// from what is very near: that shows best what is in the rectangle, but least of all colours.
+///
+/// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
+/// rectangle and is in places like what is around it. So the cut of the lowest energy counts. Where one of GrabCut's
+/// own start reaches all four sides of its rectangle, as the object of a tight one does, others have to be better by
+/// a margin. A cut whose size or pieces are not those of an object has a low energy too, because it says little: then
+/// two more starts are tried.
+fn best_cut(
+    pyramid: &Pyramid<'_>,
+    rect: Rect,
+    ranked: InitialModels,
+    settings: &SegmentSettings,
+) -> Result<(CoarseCut, bool), MaskError> {
+    let coarsest = pyramid.coarsest();
+    let part = pyramid.shrunk(rect);
+    let energy = CutEnergy::new(&coarsest.image, part);
+    let cut = |labels: Vec<Label>, first: InitialModels, near: f64| {
+        let cut = pyramid.cut(labels, first, Some(surroundings(rect, near)))?;
+        let cleaned = cleanup::clean(&cut.object, &[], settings.keep_all, FILLED_OF_FRAME);
+        let margin = if first == InitialModels::All && fills(cleaned.mask.bounds(), part) {
+            MARGIN
+        } else {
+            0.0
+        };
+        Ok(Candidate {
+            energy: energy.of(&cleaned.mask) - margin,
+            is_plausible: is_plausible(&cut.object, &cleaned.mask, part),
+            cut,
+        })
     };
-    let energy = CutEnergy::new(frame, rect);
-    let energy = |mask: &Mask| energy.of(&Bitmap::from_mask(&mask.image));
     let all = InitialModels::All;
-    let starts = [(all, VERY_NEAR), (all, NEAR), (first, NEAR)];
-    let cut_near = |labels, first, share| cut(labels, first, Some(surroundings(rect, size, share)));
-    let mut cuts = Vec::new();
-    let mut failed = None;
-    for (first, share) in starts {
-        match cut_near(labels.clone(), first, share) {
-            Ok(mask) => {
-                let fills = first == all && fills(mask.statistics.bounding_box, rect);
-                cuts.push((energy(&mask) - if fills { MARGIN } else { 0.0 }, mask));
-            }
+    let usual = [(all, VERY_NEAR), (all, NEAR), (ranked, NEAR)];
+    let (mut cuts, mut failed) = (Vec::new(), None);
+    for (first, near) in usual {
+        match cut(coarsest.labels.clone(), first, near) {
+            Ok(found) => cuts.push(found),
             Err(error) => failed = failed.or(Some(error)),
         }
     }
-    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let best = cuts.first();
-    if best.is_some_and(|(_, mask)| !is_plausible(mask, rect)) {
-        let middle = in_ellipse(&labels, rect, size.0);
+    cuts.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+    let is_usual = cuts.first().is_none_or(|best| best.is_plausible);
+    if !is_usual {
+        let middle = in_ellipse(&coarsest.labels, part, coarsest.image.width());
+        let other = InitialModels::Ranked(OTHER_SHARE);
         let more = [
-            cut_near(labels, InitialModels::Ranked(OTHER_SHARE), NEAR),
-            cut_near(middle, all, NEAR),
+            cut(coarsest.labels.clone(), other, NEAR),
+            cut(middle, all, NEAR),
         ];
-        let more = more.into_iter().flatten();
-        cuts.extend(more.map(|mask| (energy(&mask), mask)));
-        let plausible = cuts
-            .iter()
-            .enumerate()
-            .filter(|(_, (_, mask))| is_plausible(mask, rect));
-        let best = plausible.min_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        let mut mask = cuts.swap_remove(best.map_or(0, |(at, _)| at)).1;
-        mask.warnings.push(IMPLAUSIBLE.to_owned());
-        return Ok(mask);
+        cuts.extend(more.into_iter().flatten());
+        cuts.sort_by(|a, b| {
+            let plausible = b.is_plausible.cmp(&a.is_plausible);
+            plausible.then(a.energy.total_cmp(&b.energy))
+        });
     }
-    let best = cuts.into_iter().next().map(|(_, mask)| mask);
-    best.ok_or(failed.unwrap_or(MaskError::Empty))
+    let best = cuts.into_iter().next();
+    let best = best.ok_or(failed.unwrap_or(MaskError::Empty))?;
+    Ok((best.cut, is_usual))
 }
 
-/// A rectangle with what is around it within a share of its longer side, in the frame.
-fn surroundings(rect: Rect, (width, height): (u32, u32), share: f64) -> Rect {
+/// A rectangle with what is around it within a share of its longer side.
+fn surroundings(rect: Rect, share: f64) -> Rect {
     let around = (f64::from(rect.w.max(rect.h)) * share) as u32;
-    let grown = Rect::new(
+    Rect::new(
         rect.x.saturating_sub_unsigned(around),
         rect.y.saturating_sub_unsigned(around),
         rect.w.saturating_add(2 * around),
         rect.h.saturating_add(2 * around),
-    );
-    grown.clipped_to(width, height).unwrap_or(rect)
+    )
 }
 
-/// Whether a cut is an object by its size and its pieces.
-fn is_plausible(mask: &Mask, rect: Rect) -> bool {
+/// Whether what was kept of a cut is an object by its size and its pieces.
+fn is_plausible(cut: &Bitmap, kept: &Bitmap, rect: Rect) -> bool {
     let area = f64::from(rect.w) * f64::from(rect.h);
-    mask.statistics.area_px as f64 >= LEAST_OF_RECT * area && mask.kept_share >= LEAST_KEPT
+    let kept = kept.count() as f64;
+    kept >= LEAST_OF_RECT * area && kept >= LEAST_KEPT * cut.count() as f64
 }
 
 /// The labels with the corners of a rectangle, outside its inscribed ellipse, as background at first.
@@ -377,7 +408,6 @@ fn finish(
             holes_filled_px: cleaned.holes.iter().map(|hole| hole.area).sum(),
         },
         names_hole: filled(&cleaned, area_px as f64).is_some(),
-        kept_share: area_px as f64 / raw.count().max(1) as f64,
         warnings: warnings(hints, rect, &cleaned, size),
     }
 }
@@ -404,6 +434,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_far_from_the_rectangle_may_have_the_colour_of_the_object() {
+        let inside = |x: u32, y: u32| (30..60).contains(&x) && (30..60).contains(&y);
+        let frame = RgbImage::from_fn(300, 90, |x, y| {
+            let grain = ((x * 7 + y * 13) % 11) as u8;
+            image::Rgb(if inside(x, y) || x > 120 {
+                [150 + grain, 70, 40]
+            } else {
+                [130 + grain, 80, 40]
+            })
+        });
+        let hints = Hints::from(Rect::new(20, 20, 50, 50));
+        let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
+        assert_eq!(mask.statistics.bounding_box, Rect::new(30, 30, 30, 30));
+    }
+
+    #[test]
     fn a_start_from_the_middle_leaves_the_corners_out_and_keeps_what_is_sure() {
         let mut labels = vec![Label::ProbablyObject; 100];
         labels[0] = Label::Object;
@@ -417,10 +463,9 @@ mod tests {
     fn a_cut_that_covers_little_of_its_rectangle_or_is_in_pieces_is_not_plausible() {
         let rect = Rect::new(0, 0, 10, 10);
         let plausible = |rows: [&str; 10]| {
-            let raw = Bitmap::drawn(&rows);
-            let settings = SegmentSettings::default();
-            let mask = finish(&raw, (10, 10), &rect.into(), Some(rect), &settings, 0.0);
-            is_plausible(&mask, rect)
+            let cut = Bitmap::drawn(&rows);
+            let cleaned = cleanup::clean(&cut, &[], false, 0.0);
+            is_plausible(&cut, &cleaned.mask, rect)
         };
         let whole = "..######..";
         assert!(plausible([whole; 10]));

@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn an_edge_is_farther_than_a_gradient() {
-        let row = Row([0.0, 10.0, 20.0, 30.0, 40.0, 90.0, 90.0]);
+        let row = Row([0.0, 10.0, 20.0, 30.0, 40.0, 140.0, 140.0]);
         let mut labels = [Label::ProbablyBackground; 7];
         labels[0] = Label::Object;
         labels[6] = Label::Background;

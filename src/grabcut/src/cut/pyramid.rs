@@ -67,35 +67,89 @@ pub(crate) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Ve
     levels
 }
 
-/// Cuts the object out of `image`, with what is known of it. Models learn from the pixels in `sampled`, or from all.
-pub(crate) fn segment(
-    image: &RgbImage,
-    known: Vec<Label>,
-    first: InitialModels,
+/// An image at all its sizes, with what is known of it.
+pub(crate) struct Pyramid<'a> {
+    coarsest: Level<'a>,
+    /// From fine to coarse.
+    finer: Vec<Level<'a>>,
+    table: LabTable,
+}
+
+/// A cut at the coarsest size.
+pub(crate) struct CoarseCut {
+    pub(crate) object: Bitmap,
+    labels: Vec<Label>,
+    models: Models<3>,
     sampled: Option<Rect>,
-    effort: Effort,
-) -> Result<Bitmap, MaskError> {
-    let table = LabTable::new();
-    let full = image.width();
-    let mut finer = levels(image, known, COARSEST_PX);
-    let Some(mut coarsest) = finer.pop() else {
-        return Err(MaskError::Empty);
-    };
-    let size = coarsest.size();
-    let mut field = RgbField::converted(&coarsest.image, &table).sampling(sampled, full);
-    if first == InitialModels::Sure {
-        field.evidence = geodesic::evidence(&field, &coarsest.labels);
+}
+
+impl<'a> Pyramid<'a> {
+    pub(crate) fn new(image: &'a RgbImage, known: Vec<Label>) -> Result<Self, MaskError> {
+        let mut finer = levels(image, known, COARSEST_PX);
+        Ok(Self {
+            coarsest: finer.pop().ok_or(MaskError::Empty)?,
+            finer,
+            table: LabTable::new(),
+        })
     }
-    let mut models = begin_smooth(&field, &mut coarsest.labels, first)?;
-    let field = |_, image| RgbField::new(image, &table).sampling(sampled, full);
-    Ok(ascend(
-        &finer,
-        coarsest.labels,
-        size,
-        &mut models,
-        effort,
-        field,
-    ))
+
+    /// The image at its coarsest size, with what is known at it.
+    pub(crate) fn coarsest(&self) -> &Level<'a> {
+        &self.coarsest
+    }
+
+    /// A part of the image in the pixels of the coarsest size.
+    pub(crate) fn shrunk(&self, part: Rect) -> Rect {
+        shrunk(part, self.finer.len())
+    }
+
+    /// Cuts at the coarsest size, which starts with these labels. Models learn from the pixels in `sampled`, or from
+    /// all.
+    pub(crate) fn cut(
+        &self,
+        mut labels: Vec<Label>,
+        first: InitialModels,
+        sampled: Option<Rect>,
+    ) -> Result<CoarseCut, MaskError> {
+        let mut field = RgbField::converted(&self.coarsest.image, &self.table);
+        field.sampled = sampled.map(|part| self.shrunk(part));
+        if first == InitialModels::Sure {
+            field.evidence = geodesic::evidence(&field, &labels);
+        }
+        let models = begin_smooth(&field, &mut labels, first)?;
+        Ok(CoarseCut {
+            object: grab_cut::object_of(&labels, self.coarsest.size()),
+            labels,
+            models,
+            sampled,
+        })
+    }
+
+    /// Takes a cut up to the finest size.
+    pub(crate) fn refined(&self, mut cut: CoarseCut, effort: Effort) -> Bitmap {
+        let field = |steps, image| RgbField {
+            sampled: cut
+                .sampled
+                .map(|part| shrunk(part, self.finer.len() - 1 - steps)),
+            ..RgbField::new(image, &self.table)
+        };
+        ascend(
+            &self.finer,
+            cut.labels,
+            self.coarsest.size(),
+            &mut cut.models,
+            effort,
+            field,
+        )
+    }
+}
+
+/// A part of an image in the pixels of the image that was halved so often.
+fn shrunk(part: Rect, halvings: usize) -> Rect {
+    let end = |end: i64| ((end - 1) >> halvings) + 1;
+    let (x, y) = (part.x >> halvings, part.y >> halvings);
+    let side = |begin: i32, last: i64| (end(last) - i64::from(begin)) as u32;
+    Rect::new(x, y, side(x, part.right()), side(y, part.bottom()))
 }
 
 /// Takes a result of this size up to the finest of the levels, whose order is from fine to coarse. `field` is given how
@@ -291,18 +345,6 @@ impl<'a> RgbField<'a> {
     }
 }
 
-impl RgbField<'_> {
-    /// With the part from which models learn, in pixels of an image that is `full` wide.
-    fn sampling(self, part: Option<Rect>, full: u32) -> Self {
-        let factor = full.div_ceil(self.image.width().max(1)).next_power_of_two();
-        let sampled = part.map(|Rect { x, y, w, h }| {
-            let by = factor.cast_signed();
-            Rect::new(x / by, y / by, w.div_ceil(factor), h.div_ceil(factor))
-        });
-        Self { sampled, ..self }
-    }
-}
-
 impl Field<3> for RgbField<'_> {
     const VARIANCE_FLOOR: f64 = COLOUR_VARIANCE;
 
@@ -330,5 +372,16 @@ impl Field<3> for RgbField<'_> {
     fn is_sampled(&self, at: usize) -> bool {
         self.sampled
             .is_none_or(|part| part.contains(at, self.image.width()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shrunk_part_has_all_pixels_that_it_touches() {
+        assert_eq!(shrunk(Rect::new(3, 4, 5, 4), 1), Rect::new(1, 2, 3, 2));
+        assert_eq!(shrunk(Rect::new(-3, 0, 4, 8), 2), Rect::new(-1, 0, 2, 2));
     }
 }

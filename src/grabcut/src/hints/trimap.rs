@@ -6,13 +6,14 @@ use crate::cut::grab_cut::Label;
 use crate::cut::pyramid::InitialModels;
 use crate::{Hints, Mark, MaskError};
 
-/// Share of a rectangle that is taken for background at first: a person leaves about half free.
+/// Share of a rectangle that is background in a ranked start: a person leaves about half free.
 const SHARE_OF_RECT: f64 = 0.5;
 
-/// The labels with which the cut starts.
+/// The labels with which cuts start.
 #[derive(Debug)]
 pub(crate) struct Trimap {
     pub(crate) labels: Vec<Label>,
+    /// The models of the only start; with a rectangle, of the ranked one.
     pub(crate) first: InitialModels,
     /// The part of the hinted rectangle that is inside the frame.
     pub(crate) rect: Option<Rect>,
