@@ -93,7 +93,7 @@ pub(crate) trait Field<const D: usize> {
     fn evidence(&self, _at: usize) -> f32 {
         0.0
     }
-    /// Whether the models learn from a pixel.
+    /// Whether it is in the part from which the models learn.
     fn is_sampled(&self, _at: usize) -> bool {
         true
     }
@@ -361,7 +361,9 @@ fn samples<const D: usize, F: Field<D>>(
     labels: &[Label],
     wanted: impl Fn(Label) -> bool,
 ) -> Vec<[f32; D]> {
-    let wanted = |&at: &usize| wanted(labels[at]) && field.is_sampled(at);
+    // A side of which nothing is in the sampled part is learned from all of it.
+    let is_near = (0..labels.len()).any(|at| wanted(labels[at]) && field.is_sampled(at));
+    let wanted = |&at: &usize| wanted(labels[at]) && (field.is_sampled(at) || !is_near);
     let all = (0..labels.len()).filter(wanted).count();
     let step = all.div_ceil(MAX_SAMPLES).max(1);
     let taken = (0..labels.len()).filter(wanted).step_by(step);

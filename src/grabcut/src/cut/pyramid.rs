@@ -380,6 +380,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_side_that_is_not_in_the_part_is_learned_from_all_of_it() {
+        let part = Rect::new(2, 2, 4, 4);
+        let inside = |at: usize| part.contains(at, 8);
+        let colour = |x, y| {
+            if inside(8 * y as usize + x as usize) {
+                [200, 40, 40]
+            } else {
+                [40, 40, 200]
+            }
+        };
+        let image = RgbImage::from_fn(8, 8, |x, y| image::Rgb(colour(x, y)));
+        let labels: Vec<Label> = (0..64).map(|at| Label::probably(inside(at))).collect();
+        let table = LabTable::new();
+        let mut field = RgbField::new(&image, &table);
+        field.sampled = Some(part);
+        let models = Models::learn(&field, &labels, |_| true);
+        assert!(models.log_ratio(&field.feature(0)) < -10.0);
+        assert!(models.log_ratio(&field.feature(27)) > 10.0);
+    }
+
+    #[test]
     fn a_shrunk_part_has_all_pixels_that_it_touches() {
         assert_eq!(shrunk(Rect::new(3, 4, 5, 4), 1), Rect::new(1, 2, 3, 2));
         assert_eq!(shrunk(Rect::new(-3, 0, 4, 8), 2), Rect::new(-1, 0, 2, 2));
