@@ -222,7 +222,7 @@ impl RelightableObject {
     /// [`exposure_between`](super::exposure_between)), of the size of [`RelightableObject::extent`], not yet multiplied with alpha.
     ///
     /// With E the irradiance of the old light on the normals and E' that of the new, R the albedo, S and H shading and highlight
-    /// of the photograph I, and w the [`likeness`] of the lights:
+    /// of the photograph I, and w the likeness of the lights:
     ///
     /// ```text
     /// D = (S + d) / (E + d) = relief x shadow, d = 0.05
