@@ -34,7 +34,7 @@ pub enum TurntableError {
     ),
     /// Another process owns the port.
     #[error(
-        "{} uses {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does)",
+        "{} uses {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does, from the account that runs it)",
         process_named(*.pid)
     )]
     Owned {

@@ -11,6 +11,7 @@ mod worker;
 
 use std::fs::{File, TryLockError};
 use std::io;
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -23,6 +24,7 @@ use dispatcher::Dispatcher;
 use relit_data::clock::{Clock, JoinHandle};
 use relit_turntable::holder;
 use relit_turntable::simulator::SimulatedTable;
+use rustix::fs::OFlags;
 use worker::Worker;
 
 /// The file in a folder of sessions that its daemon keeps locked.
@@ -128,7 +130,17 @@ impl Drop for Daemon {
 fn lock(root: &Path) -> Result<File, CaptureError> {
     let path = root.join(LOCK_FILE);
     let failed = |doing| CaptureError::system(path.display().to_string(), doing);
-    let file = File::create(&path).map_err(failed("opened"))?;
+    // No link, and nothing that keeps an opener waiting: the folder may belong to somebody else.
+    let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::NOCTTY;
+    let mut options = File::options();
+    options.write(true).create(true).truncate(false);
+    let file = options
+        .custom_flags(flags.bits().cast_signed())
+        .open(&path)
+        .map_err(failed("opened"))?;
+    if !file.metadata().map_err(failed("opened"))?.is_file() {
+        return Err(failed("opened")(io::Error::other("it is not a plain file")));
+    }
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
@@ -191,6 +203,26 @@ fn report_recovered(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lock_that_is_a_link_or_a_pipe_is_refused_and_what_it_leads_to_stays() {
+        let root = tempfile::tempdir().unwrap();
+        let (path, precious) = (root.path().join(LOCK_FILE), root.path().join("precious"));
+        std::fs::write(&precious, "precious").unwrap();
+        std::os::unix::fs::symlink(&precious, &path).unwrap();
+        assert!(matches!(
+            lock(root.path()),
+            Err(CaptureError::System { .. })
+        ));
+        assert_eq!(std::fs::read(&precious).unwrap(), b"precious");
+        std::fs::remove_file(&path).unwrap();
+        let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+        rustix::fs::mkfifoat(rustix::fs::CWD, &path, mode).unwrap();
+        assert!(matches!(
+            lock(root.path()),
+            Err(CaptureError::System { .. })
+        ));
+    }
 
     #[test]
     fn a_worker_that_panics_leaves_a_fault_and_takes_no_more_commands() {

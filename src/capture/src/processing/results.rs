@@ -166,8 +166,8 @@ impl SessionResults {
             ProcessingStep::Extract => {
                 let made = self.extraction.as_ref()?;
                 let mut what = format!("{} samples, {}", made.samples, made.verdict);
-                if let Some(reason) = made.reasons.first().filter(|_| made.is_doubtful()) {
-                    what = format!("{what}: {reason}");
+                if made.is_doubtful() && !made.reasons.is_empty() {
+                    what = format!("{what}: {}", made.reasons.join("; "));
                 }
                 (what, made.is_doubtful(), true)
             }
