@@ -11,7 +11,7 @@ fn main() -> std::process::ExitCode {
 /// Lets the C library give buffers as large as a frame back to the system as soon as they are freed. Otherwise each
 /// thread's heap keeps those of the first steps, a fifth of all memory, to the end.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-#[allow(unsafe_code)]
+#[allow(unsafe_code, reason = "settings of the C library")]
 fn return_large_buffers() {
     // SAFETY: the calls set numbers of the allocator, and no other thread runs yet. Where one fails, nothing changes.
     unsafe {
