@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use rig_firmware::board::{Board, Events, Inputs, Outputs, ResetCause};
 use rig_firmware::controller::Controller;
-use rig_firmware::realtime::{Realtime, Received, classify};
+use rig_firmware::realtime::{Received, classify};
 use rig_firmware::stepper::Stepper;
 
 /// Timer ticks a microsecond.
@@ -132,14 +132,7 @@ impl FakeBoard {
             Received::Data(byte) => self.receive.push_back(byte),
             Received::Realtime(realtime) => {
                 self.stepper.obey(realtime);
-                self.events.insert(match realtime {
-                    Realtime::Status => Events::STATUS,
-                    Realtime::Hold => Events::HOLD,
-                    Realtime::Resume => Events::RESUME,
-                    Realtime::Reset => Events::RESET,
-                    Realtime::JogCancel => Events::JOG_CANCEL,
-                    Realtime::Ignored => Events::NONE,
-                });
+                self.events.insert(realtime.into());
             }
         }
     }

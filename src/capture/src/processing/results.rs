@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use relit_data::session::MASK_FILE;
+use relit_data::session::{MASK_FILE, Manifest};
 use relit_data::shard::{Dataset, QualityVerdict};
 use serde::Serialize;
 use serde_json::Value;
@@ -95,11 +95,8 @@ pub(crate) struct SessionResults {
     pub(crate) extraction: Option<ExtractionState>,
 }
 
-/// A session's entry, and the hash of the mask that it was made with.
-pub(crate) type Entry = (ExtractionState, String);
-
-/// The entries of a data set's sessions by their names.
-pub(crate) type DatasetEntries = BTreeMap<String, Entry>;
+/// The entries of a data set's sessions by their names, each with the hash of the mask that it was made with.
+pub(crate) type DatasetEntries = BTreeMap<String, (ExtractionState, String)>;
 
 /// What a data set says about its sessions. A description that cannot be read tells of none; `relit-extract` says what
 /// is wrong with it.
@@ -120,8 +117,10 @@ pub(crate) fn entries_in(dataset: &Path) -> DatasetEntries {
     entries.collect()
 }
 
-/// What was made of the session in `folder`, with its entry in the data set.
-pub(crate) fn results_of(folder: &Path, entry: Option<Entry>) -> SessionResults {
+/// What was made of the session in `folder`, whose name may be another than the session's.
+pub(crate) fn results_of(folder: &Path, entries: &DatasetEntries) -> SessionResults {
+    let name = || folder.file_name().unwrap_or_default().to_string_lossy();
+    let id = Manifest::read(folder).map_or_else(|_| name().into_owned(), |manifest| manifest.id);
     let png = fs::read(folder.join(MASK_FILE)).ok();
     let hash = png.map(|png| blake3::hash(&png).to_hex().to_string());
     let is_same = |made: &str| hash.as_deref() == Some(made);
@@ -134,9 +133,9 @@ pub(crate) fn results_of(folder: &Path, entry: Option<Entry>) -> SessionResults 
         reasons: texts(&check["reasons"]),
         is_current: is_same(text(&check["mask_blake3"])),
     });
-    let extraction = entry.map(|(state, made_with)| ExtractionState {
-        is_current: is_same(&made_with),
-        ..state
+    let extraction = entries.get(&id).map(|(state, made_with)| ExtractionState {
+        is_current: is_same(made_with),
+        ..state.clone()
     });
     let mut results = SessionResults {
         stage: SessionStage::Recorded,
@@ -280,6 +279,18 @@ mod tests {
                 is_current: true,
             }),
         }
+    }
+
+    #[test]
+    fn a_session_in_a_folder_of_another_name_has_its_own_entry() {
+        let root = tempfile::tempdir().unwrap();
+        let recorded = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../fixtures/20261120T101500Z-cow-short/session.json");
+        fs::copy(recorded, root.path().join("session.json")).unwrap();
+        let made = results(&[], ("fits", &[]), ("good", &[], false)).extraction;
+        let entry = (made.unwrap(), String::new());
+        let entries = DatasetEntries::from([("20261120T101500Z-cow-short".to_owned(), entry)]);
+        assert!(results_of(root.path(), &entries).extraction.is_some());
     }
 
     #[test]

@@ -168,11 +168,8 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
 fn outcome(shared: &Shared, running: &Running, exit_code: Option<i32>) -> StepOutcome {
     let ProcessingJob { session, step, .. } = &running.begun;
     let made = running.heard.is_success(exit_code).then(|| {
-        let folder = shared.root.join(session);
-        // The folder may have another name than the session.
-        let id = Manifest::read(&folder).map_or_else(|_| session.clone(), |manifest| manifest.id);
-        let entry = entries_in(&shared.dataset).remove(&id);
-        results_of(&folder, entry).outcome(*step)
+        let entries = entries_in(&shared.dataset);
+        results_of(&shared.root.join(session), &entries).outcome(*step)
     });
     made.flatten().unwrap_or_else(|| {
         let error_output = running.worker.error_output();

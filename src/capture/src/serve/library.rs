@@ -8,9 +8,7 @@ use axum::http::StatusCode;
 use serde::Serialize;
 
 use super::cache::{Cache, FileVersion};
-use crate::processing::results::{
-    CHECK_PAGE, DatasetEntries, SessionResults, entries_in, results_of,
-};
+use crate::processing::results::{CHECK_PAGE, SessionResults, entries_in, results_of};
 use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
 use relit_data::session::{
@@ -120,14 +118,10 @@ impl Library {
         let made = entries_in(&(self.dataset)());
         let listed = names.iter().filter_map(|name| {
             let mut summary = self.summary(&self.root, name)?;
-            summary.results = Some(self.results_of(name, &made));
+            summary.results = Some(results_of(&self.root.join(name), &made));
             Some(summary)
         });
         Ok(listed.collect())
-    }
-
-    fn results_of(&self, name: &str, made: &DatasetEntries) -> SessionResults {
-        results_of(&self.root.join(name), made.get(name).cloned())
     }
 
     /// Names of all session folders, newest first: they begin with the date.
@@ -165,7 +159,7 @@ impl Library {
         let manifest = read_manifest(&folder).map_err(Failure::internal)?;
         let index = read_index(&folder, &manifest);
         let mut summary = summarise(id, &manifest, index.as_ref());
-        summary.results = Some(self.results_of(id, &entries_in(&(self.dataset)())));
+        summary.results = Some(results_of(&folder, &entries_in(&(self.dataset)())));
         let json = manifest
             .to_json()
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));

@@ -31,8 +31,8 @@ type IndexedPng = Result<(u32, Vec<u8>), ShardError>;
 /// verified or written, and with twice those of all.
 ///
 /// # Errors
-/// [`ShardError::Refused`] if it has this layout already, or `out` holds anything; [`ShardError::Changed`] if it is not
-/// as it was written; [`ShardError::Locked`] while it is being written; those of [`Dataset::read`].
+/// [`ShardError::Refused`] if it has this layout already, is not as it was written, or `out` holds anything;
+/// [`ShardError::Locked`] while it is being written; those of [`Dataset::read`].
 pub fn convert(
     input: &Path,
     out: &Path,
@@ -50,7 +50,7 @@ pub fn convert(
     let new = NewDataset::create(out)?;
     let verified = verify(input, &|done, of| progress(done, 2 * of))?;
     if let Some(problem) = verified.problems.first() {
-        return Err(changed(&problem.file, problem.what.clone()));
+        return Err(ShardError::Refused(problem.to_string()));
     }
     let mut settings = dataset.settings.clone();
     settings.layout = layout;
