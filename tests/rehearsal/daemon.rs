@@ -65,7 +65,7 @@ fn is_ready(state: &RigState) -> bool {
 #[test]
 fn an_object_is_captured_and_a_second_start_is_refused() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3"), || ()).unwrap();
     once(&daemon, is_ready);
     once(&daemon, |state| state.camera.focus.is_some());
     once(&daemon, |_| daemon.monitor().preview().is_some());
@@ -86,7 +86,7 @@ fn the_stop_of_a_take_does_not_reach_the_next_job() {
     let mut settings = settings(root.path(), "", "none");
     // The take is stopped in its middle: it lasts until then, however late that is.
     settings.degrees_per_second = 1.0;
-    let daemon = Daemon::start(settings).unwrap();
+    let daemon = Daemon::start(settings, || ()).unwrap();
     once(&daemon, |state| state.camera.present);
     daemon.command(start("mug")).unwrap();
     once(&daemon, |state| state.frames > 5);
@@ -104,7 +104,7 @@ fn the_stop_of_a_take_does_not_reach_the_next_job() {
 #[test]
 fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=1")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=1"), || ()).unwrap();
     once(&daemon, is_ready);
     daemon.command(Command::Jog { degrees: 390.0 }).unwrap();
     once(&daemon, |_| moves(&daemon));
@@ -132,7 +132,7 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
 #[test]
 fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=3")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "&unplug=60", "sim:?speed=3"), || ()).unwrap();
     once(&daemon, |state| state.camera.present);
     // It may be back before anybody looks.
     once(&daemon, |state| {
@@ -147,7 +147,7 @@ fn a_camera_that_was_unplugged_comes_back_without_a_restart() {
 #[test]
 fn a_fault_is_shown_with_its_cause() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "serial:/dev/null")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "serial:/dev/null"), || ()).unwrap();
     let state = once(&daemon, |state| state.table.fault.is_some());
     let fault = state.table.fault.unwrap();
     let cause = SerialPort::open(Path::new("/dev/null")).unwrap_err();
@@ -160,8 +160,8 @@ fn a_fault_is_shown_with_its_cause() {
 #[test]
 fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
     let root = tempfile::tempdir().unwrap();
-    let _first = Daemon::start(settings(root.path(), "", "none")).unwrap();
-    let error = Daemon::start(settings(root.path(), "", "none")).unwrap_err();
+    let _first = Daemon::start(settings(root.path(), "", "none"), || ()).unwrap();
+    let error = Daemon::start(settings(root.path(), "", "none"), || ()).unwrap_err();
     let CaptureError::InUse { pid, .. } = error else {
         panic!("{error}");
     };
@@ -174,7 +174,7 @@ fn a_session_whose_recorder_died_is_recovered_at_the_start_and_told() {
     let json = std::fs::read(fixture(SHORT).join("session.json")).unwrap();
     let manifest = Manifest::from_json(&json).unwrap();
     drop(SessionWriter::create(root.path(), manifest).unwrap());
-    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "none"), || ()).unwrap();
     let faults = daemon.monitor().state().faults;
     assert_eq!(faults.len(), 1, "{faults:?}");
     assert!(faults[0].what.contains(SHORT), "{faults:?}");
@@ -183,7 +183,7 @@ fn a_session_whose_recorder_died_is_recovered_at_the_start_and_told() {
 #[test]
 fn commands_that_make_no_sense_are_refused_where_they_are_given() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "none"), || ()).unwrap();
     let refused = |command: Command| daemon.command(command).unwrap_err();
     assert!(matches!(refused(start("a/b")), CommandError::Invalid(_)));
     assert!(matches!(
@@ -199,7 +199,7 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
 #[test]
 fn a_table_without_an_index_says_what_to_do_until_its_zero_is_set() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3"), || ()).unwrap();
     let table = once(&daemon, is_ready).table;
     assert!(!table.has_index && !table.homed, "{table:?}");
     assert!(table.fault.is_some(), "{table:?}");
@@ -221,7 +221,7 @@ fn press_in_motion(daemon: &Daemon) -> RigState {
 #[test]
 fn after_an_emergency_stop_one_command_brings_the_table_back() {
     let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3"), || ()).unwrap();
     once(&daemon, is_ready);
     let state = press_in_motion(&daemon);
     let pressed = state.table.fault.unwrap();
@@ -266,7 +266,7 @@ fn a_speed_that_the_table_does_not_reach_is_refused_before_start() {
     let root = tempfile::tempdir().unwrap();
     let mut settings = settings(root.path(), "", "sim:?speed=20");
     settings.degrees_per_second = 72.0;
-    let daemon = Daemon::start(settings).unwrap();
+    let daemon = Daemon::start(settings, || ()).unwrap();
     let state = once(&daemon, is_ready);
     assert_eq!(state.table.max_degrees_per_second, Some(36.0));
     let refused = daemon.command(start("mug")).unwrap_err();

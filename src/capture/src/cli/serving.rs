@@ -30,7 +30,8 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
         ending.cancel();
     };
     at_end(end).map_err(CaptureError::system("the signals", "listened to"))?;
-    let rig = Arc::new(Daemon::start(settings)?);
+    let failing = shutdown.clone();
+    let rig = Arc::new(Daemon::start(settings, move || failing.cancel())?);
     let processing = ProcessingOptions {
         datasets: asked.datasets,
         programs: Box::new(programs),
@@ -53,10 +54,14 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
         announce(console, announcement, is_for_phones, keeps_token);
     })?;
     // Threads of the server may hold the rig a moment longer: its end does not wait for them.
-    rig.end();
+    let ended_well = rig.end();
     processing.end();
     drop(made);
-    Ok(Outcome::Success)
+    Ok(if ended_well {
+        Outcome::Success
+    } else {
+        Outcome::Failure
+    })
 }
 
 fn announce(console: Console, announcement: &Announcement, is_for_phones: bool, keeps_token: bool) {

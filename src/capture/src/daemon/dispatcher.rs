@@ -95,15 +95,6 @@ impl Dispatcher {
         plan.stop.request(StopReason::Shutdown);
     }
 
-    /// Shows that the worker has failed; nothing is carried out any more.
-    pub(super) fn fail(&self) {
-        self.end();
-        self.monitor.fault(
-            self.clock.now_us(),
-            "the control of camera and table failed, which is an error in this program: start it again",
-        );
-    }
-
     /// What the worker does now.
     pub(super) fn begin(&self) -> Next {
         let mut plan = self.lock();

@@ -12,9 +12,9 @@ mod worker;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::os::unix::fs::OpenOptionsExt as _;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
 
 use crate::capture::{CaptureError, Equipment, Settings, preflight, recover};
 use crate::command::{Command, CommandError, Rig};
@@ -45,11 +45,15 @@ pub struct Daemon {
 impl Daemon {
     /// Takes the folder for this process, recovers sessions whose recorder died, and starts
     /// the worker, which opens camera and table, and keeps trying while they are not there.
+    /// `failed` is called if the worker panics: nothing is carried out any more, and the process should end.
     ///
     /// # Errors
     /// [`CaptureError::InUse`] if another daemon has it, [`CaptureError::Refused`] for speeds that do not fit, or what
     /// the system answers.
-    pub fn start(settings: Settings) -> Result<Self, CaptureError> {
+    pub fn start(
+        settings: Settings,
+        failed: impl FnOnce() + Send + 'static,
+    ) -> Result<Self, CaptureError> {
         let root = settings.root.clone();
         let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;
@@ -63,7 +67,7 @@ impl Daemon {
         let clock = equipment.clock();
         let simulator = equipment.simulator().cloned();
         let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
-        let worker = spawn(&clock, &dispatcher, move || worker.run()).map_err(thread)?;
+        let worker = spawn(&clock, failed, move || worker.run()).map_err(thread)?;
         Ok(Self {
             dispatcher,
             root,
@@ -79,15 +83,12 @@ impl Daemon {
     }
 
     /// Aborts what is under way, stops the table, and comes back when all of it is done. Does nothing
-    /// the second time.
-    pub fn end(&self) {
+    /// the second time. False if the worker panicked; its table was stopped then, too.
+    pub fn end(&self) -> bool {
         self.dispatcher.end();
         let worker = self.worker.lock();
         let worker = worker.unwrap_or_else(PoisonError::into_inner).take();
-        if let Some(worker) = worker {
-            // A panic in there was reported by the thread itself, and its table was stopped.
-            let _ = worker.join();
-        }
+        worker.is_none_or(|worker| worker.join().is_ok())
     }
 }
 
@@ -154,28 +155,18 @@ fn lock(root: &Path) -> Result<File, CaptureError> {
     }
 }
 
-/// Starts the worker's thread.
+/// Starts the worker's thread, which calls `failed` where it panics.
 fn spawn(
     clock: &Clock,
-    dispatcher: &Arc<Dispatcher>,
+    failed: impl FnOnce() + Send + 'static,
     work: impl FnOnce() + Send + 'static,
 ) -> io::Result<JoinHandle<()>> {
-    let panic_report = PanicReport(Arc::clone(dispatcher));
     clock.spawn("relit-rig", move || {
-        let _panic_report = panic_report;
-        work();
-    })
-}
-
-/// Shows that the worker failed, and refuses further commands, where its thread panicked.
-struct PanicReport(Arc<Dispatcher>);
-
-impl Drop for PanicReport {
-    fn drop(&mut self) {
-        if thread::panicking() {
-            self.0.fail();
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
+            failed();
+            resume_unwind(panic);
         }
-    }
+    })
 }
 
 fn check_jog(degrees: f64) -> Result<(), CommandError> {
@@ -225,16 +216,12 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_that_panics_leaves_a_fault_and_takes_no_more_commands() {
-        let clock = Clock::virtual_time();
-        let dispatcher = Arc::new(Dispatcher::new(clock.clone()));
-        let worker = spawn(&clock, &dispatcher, || {
-            std::panic::resume_unwind(Box::new(()));
-        });
-        assert!(worker.unwrap().join().is_err());
-        let faults = dispatcher.monitor().state().faults;
-        assert_eq!(faults.len(), 1, "{faults:?}");
-        let refused = dispatcher.submit(Command::Home);
-        assert!(matches!(refused, Err(CommandError::Unavailable(_))));
+    fn a_worker_that_panics_ends_the_program() {
+        let (tell, told) = std::sync::mpsc::channel();
+        let failed = move || tell.send(()).unwrap();
+        let work = || resume_unwind(Box::new(()));
+        let worker = spawn(&Clock::virtual_time(), failed, work).unwrap();
+        assert!(worker.join().is_err());
+        told.recv().unwrap();
     }
 }
