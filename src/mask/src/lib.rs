@@ -5,7 +5,7 @@
 //! same input. Strokes that were
 //! painted for it are applied again, and `NAME-previous.json` keeps its record.
 //!
-//! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser;
+//! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser, [`MaskEditor`] within another server;
 //! [`check_mask`] compares a mask with what the turn shows.
 //!
 //! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
@@ -56,7 +56,7 @@ mod request;
 mod sampling;
 
 pub use against_turn::{CheckOutput, MaskReport, MaskVerdict, check_mask};
-pub use editor::edit;
+pub use editor::{MaskEditor, edit};
 pub use engine::{MaskEngine, OPENCV_KNOWS_NO_TURN};
 pub use error::MaskingError;
 pub use files::MaskFiles;

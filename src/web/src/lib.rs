@@ -9,7 +9,6 @@
 mod access;
 mod address;
 mod failure;
-mod forward;
 mod listen;
 mod listen_address;
 mod page;
@@ -19,7 +18,6 @@ mod token;
 pub use access::{AccessPolicy, LocalAddress, guard};
 pub use address::Announcement;
 pub use failure::Failure;
-pub use forward::forward;
 pub use listen::{ConnectionLimits, PageServer, Shutdown, serve_page};
 pub use listen_address::ListenAddress;
 pub use page::{IndexPage, PageAsset, SCRIPT, SKETCH, STYLE, TokenQuery, asset, index};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use relit_capture::capture::{CaptureError, Settings};
 use relit_capture::command::Rig;
 use relit_capture::daemon::Daemon;
-use relit_capture::processing::{Processing, ProcessingOptions};
+use relit_capture::processing::Processing;
 use relit_capture::serve::{Announcement, ServeOptions, Shutdown, Token, check_address, serve};
 use sd_notify::NotifyState;
 
@@ -32,11 +32,8 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
     at_end(end).map_err(CaptureError::system("the signals", "listened to"))?;
     let failing = shutdown.clone();
     let rig = Arc::new(Daemon::start(settings, move || failing.cancel())?);
-    let processing = ProcessingOptions {
-        datasets: asked.datasets,
-        programs: Box::new(programs),
-    };
-    let processing = Processing::start(rig.root(), rig.monitor().clone(), processing)?;
+    let monitor = rig.monitor().clone();
+    let processing = Processing::start(rig.root(), monitor, asked.datasets, programs())?;
     let processing = Arc::new(processing);
     let names = asked.listen.names(&asked.names);
     // Another name than the machine's own leads here from elsewhere.

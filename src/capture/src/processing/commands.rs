@@ -51,18 +51,14 @@ impl ProcessingPrograms {
         Some(self.launch(program.as_deref()?, arguments))
     }
 
-    /// The editor of a session's mask, on this machine alone, without the launcher: a person waits for it. It continues
-    /// with a `recipe` where there is one.
-    pub(super) fn editor(&self, session: &Path, recipe: Option<&Path>) -> Option<Command> {
-        let mut arguments: Vec<OsString> = vec![session.into(), "--edit".into(), "--json".into()];
-        match recipe {
-            Some(recipe) => arguments.extend(["--recipe".into(), recipe.into()]),
-            None => arguments.push("--auto".into()),
+    /// The program that a step needs and that is not installed.
+    pub(super) fn missing(&self, step: ProcessingStep) -> Option<&'static str> {
+        match step {
+            ProcessingStep::Mask | ProcessingStep::Check => {
+                self.mask.is_none().then_some("relit-mask")
+            }
+            ProcessingStep::Extract => self.extract.is_none().then_some("relit-extract"),
         }
-        arguments.extend(["--listen".into(), "127.0.0.1:0".into()]);
-        let mut command = Command::new(self.mask.as_deref()?);
-        command.args(arguments);
-        Some(command)
     }
 
     fn launch(&self, program: &Path, arguments: Vec<OsString>) -> Command {
@@ -99,13 +95,6 @@ mod tests {
             ..ProcessingPrograms::default()
         };
         assert!(programs.command(ProcessingStep::Mask, &places).is_none());
-        assert!(programs.editor(&places.session, None).is_none());
-        let with_editor = ProcessingPrograms {
-            mask: Some("/bin/relit-mask".into()),
-            ..programs.clone()
-        };
-        let editor = with_editor.editor(&places.session, None).unwrap();
-        assert_eq!(editor.get_program(), "/bin/relit-mask");
         let command = programs.command(ProcessingStep::Extract, &places).unwrap();
         let wanted =
             "ionice -c 3 /bin/relit-extract /s/mug -o /d --resume --progress --partial --json";

@@ -1,126 +1,148 @@
-//! The editor of masks: `relit-mask --edit`, reachable on this machine alone, for one session at a time.
+//! The editor of masks, for one session at a time. While the rig is busy it takes no requests.
 
-use std::net::SocketAddr;
-use std::path::Path;
+use std::fmt;
+use std::sync::{MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use std::{fs, thread};
 
+use axum::Router;
+use relit_data::causes::with_causes;
 use relit_data::session::MASK_FILE;
+use relit_grabcut::{Hints, SegmentSettings};
+use relit_mask::{MaskEditor, MaskRequest, MaskingError};
 
-use super::child::Worker;
-use super::commands::ProcessingPrograms;
-use super::events::ProgramEvent;
-use super::shared::{Shared, is_busy};
+use super::{Processing, Shared, is_busy};
 use crate::command::CommandError;
 
-/// Time in which the editor has to come up: it reads the video through once.
-const START: Duration = Duration::from_secs(60);
-/// An editor that nobody used for so long is ended.
+/// An editor that nobody used for so long is closed.
 const UNUSED: Duration = Duration::from_secs(15 * 60);
 /// Somebody who used it within this time is still at it.
 const IN_USE: Duration = Duration::from_secs(60);
-/// Time between two looks at it.
-const LOOK: Duration = Duration::from_millis(20);
-
-/// Where requests for the editor go.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct EditorTarget {
-    /// Its address, on this machine.
-    pub address: SocketAddr,
-    /// What it demands.
-    pub token: String,
-}
-
-impl EditorTarget {
-    /// Of what the editor says of itself.
-    pub(super) fn parse(address: &str, url: &str) -> Option<Self> {
-        let (_, token) = url.split_once("?token=")?;
-        Some(Self {
-            address: address.parse().ok()?,
-            token: token.to_owned(),
-        })
-    }
-}
+/// The editor's message while the rig is busy.
+const HELD: &str = "the rig is capturing: the editor continues afterwards";
 
 /// An editor that is open.
-#[derive(Debug)]
 pub(super) struct OpenEditor {
     pub(super) session: String,
-    pub(super) target: EditorTarget,
-    worker: Worker,
-    heard: ProgramEvent,
+    editor: MaskEditor,
     used: Instant,
 }
 
-impl OpenEditor {
-    /// Starts the editor of a session's mask and waits until it can be reached. It is held while the rig is busy.
-    pub(super) fn open(
-        shared: &Shared,
-        programs: &ProcessingPrograms,
-        session: &str,
-        folder: &Path,
-    ) -> Result<Self, CommandError> {
-        let recipe = recipe(folder);
-        let command = programs.editor(folder, recipe.as_deref());
-        let missing =
-            || CommandError::Unavailable("relit-mask is not installed on this machine".to_owned());
-        let failed =
-            |why: String| CommandError::Unavailable(format!("the editor did not open: {why}"));
-        let started = shared.start(command.ok_or_else(missing)?);
-        let mut worker = started.map_err(|error| failed(error.to_string()))?;
-        let mut heard = ProgramEvent::default();
-        let until = Instant::now() + START;
-        loop {
-            worker.set_paused(is_busy(&shared.monitor));
-            worker.read_events(&mut heard);
-            if let Some(target) = heard.editor() {
-                return Ok(Self {
-                    session: session.to_owned(),
-                    target: target.clone(),
-                    worker,
-                    heard,
-                    used: Instant::now(),
-                });
-            }
-            match worker.ended(&mut heard) {
-                Ok(None) if Instant::now() < until => thread::park_timeout(LOOK),
-                Ok(None) => return Err(failed("it took too long".to_owned())),
-                Ok(Some(status)) => {
-                    let error_output = worker.error_output();
-                    return Err(failed(heard.failure(status.code(), &error_output)));
-                }
-                Err(error) => return Err(failed(error.to_string())),
-            }
-        }
-    }
-
-    /// Somebody uses it.
-    pub(super) fn touch(&mut self) {
-        self.used = Instant::now();
-    }
-
-    /// Whether somebody used it a moment ago.
-    pub(super) fn is_in_use(&self) -> bool {
-        self.used.elapsed() < IN_USE
-    }
-
-    /// Holds it while the rig is busy. False once it is over: accepted, discarded, or abandoned.
-    pub(super) fn poll(&mut self, held: bool) -> bool {
-        self.worker.read_events(&mut self.heard);
-        self.worker.set_paused(held);
-        let is_running = matches!(self.worker.ended(&mut self.heard), Ok(None));
-        is_running && self.used.elapsed() < UNUSED
-    }
-
-    /// The session, if a mask of it was accepted.
-    pub(super) fn masked_session(&self) -> Option<&str> {
-        self.heard.has_mask().then_some(&*self.session)
+impl fmt::Debug for OpenEditor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "OpenEditor({})", self.session)
     }
 }
 
-/// How the mask was made, where the editor can go on with that.
-fn recipe(folder: &Path) -> Option<std::path::PathBuf> {
-    let path = folder.join(MASK_FILE).with_extension("json");
-    let is_there = fs::metadata(&path).is_ok_and(|file| file.is_file());
-    is_there.then_some(path)
+impl OpenEditor {
+    fn is_in_use(&self) -> bool {
+        self.used.elapsed() < IN_USE
+    }
+}
+
+impl Processing {
+    /// Opens the editor of a session's mask, or continues with the one that is open.
+    ///
+    /// # Errors
+    /// [`CommandError`] if it cannot be opened, the rig is busy, or somebody edits another session.
+    pub fn edit(&self, session: &str) -> Result<(), CommandError> {
+        let shared = &self.shared;
+        if is_busy(&shared.monitor) {
+            return Err(CommandError::Busy(HELD.to_owned()));
+        }
+        if shared.work().queue.has(session) {
+            let error = format!("{session} is being processed: wait for it, or cancel it");
+            return Err(CommandError::Busy(error));
+        }
+        let _opening = shared.opening.lock();
+        if !shared.goes_on(session)? {
+            let editor = shared.open_editor(session).map_err(|error| {
+                let why = with_causes(&error);
+                CommandError::Unavailable(format!("the editor did not open: {why}"))
+            })?;
+            *shared.editor() = Some(OpenEditor {
+                session: session.to_owned(),
+                editor,
+                used: Instant::now(),
+            });
+        }
+        shared.show();
+        Ok(())
+    }
+
+    /// What answers requests for the editor.
+    ///
+    /// # Errors
+    /// [`CommandError`] if none is open, or the rig is busy.
+    pub(crate) fn editor(&self) -> Result<Router, CommandError> {
+        if is_busy(&self.shared.monitor) {
+            return Err(CommandError::Unavailable(HELD.to_owned()));
+        }
+        let mut editor = self.shared.editor();
+        let none = || "no mask is open in the editor: open one from the list of sessions";
+        let open = editor.as_mut();
+        let open = open.ok_or_else(|| CommandError::Unavailable(none().to_owned()))?;
+        open.used = Instant::now();
+        Ok(open.editor.router())
+    }
+
+    /// Closes the editor without a mask.
+    pub fn close_editor(&self) {
+        *self.shared.editor() = None;
+        self.shared.show();
+    }
+}
+
+impl Shared {
+    pub(super) fn editor(&self) -> MutexGuard<'_, Option<OpenEditor>> {
+        self.editor.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether somebody is drawing this session's mask.
+    pub(super) fn is_edited(&self, session: &str) -> bool {
+        let editor = self.editor();
+        let open = editor.as_ref().filter(|open| open.is_in_use());
+        open.is_some_and(|open| open.session == session)
+    }
+
+    /// The editor continues with the mask as it was made, if there is one.
+    fn open_editor(&self, session: &str) -> Result<MaskEditor, MaskingError> {
+        let folder = self.root.join(session);
+        let recipe = folder.join(MASK_FILE).with_extension("json");
+        let request = if recipe.is_file() {
+            MaskRequest::from_recipe(&recipe)?
+        } else {
+            MaskRequest::new(0, Hints::default(), SegmentSettings::default()).by_turn()
+        };
+        MaskEditor::open(&folder, None, &request)
+    }
+
+    /// Whether the editor that is open is this session's. One that nobody uses makes room.
+    fn goes_on(&self, session: &str) -> Result<bool, CommandError> {
+        let mut editor = self.editor();
+        match editor.as_mut() {
+            Some(open) if open.session == session => open.used = Instant::now(),
+            Some(open) if open.is_in_use() => {
+                let other = &open.session;
+                let error =
+                    format!("the mask of {other} is being edited: finish or close it there");
+                return Err(CommandError::Busy(error));
+            }
+            _ => {
+                *editor = None;
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Closes the editor once its mask is accepted or discarded, or nobody has used it for long.
+    pub(super) fn look_after_editor(&self) {
+        let over = |open: &mut OpenEditor| open.editor.is_over() || open.used.elapsed() >= UNUSED;
+        let closed = self.editor().take_if(over);
+        if let Some(closed) = closed
+            && closed.editor.accepted().is_some()
+        {
+            self.work().queue.forget_masks(&closed.session);
+        }
+    }
 }

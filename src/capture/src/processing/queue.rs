@@ -1,12 +1,11 @@
-//! What is to be made of sessions, in which order, and when: the queue, the job under way, and whether the rig leaves
-//! time for it, as one state machine without threads, programs or files.
+//! What is to be made of sessions, and in which order: the queue and the job under way, as one state machine without
+//! threads, programs or files.
 //!
 //! ```text
 //! submit --> waiting --begin--> under way --finish--> the next step of the same session, or nothing
 //! ```
 //!
-//! While the rig is busy nothing begins, and what is under way is held. A step after which a person has to look ends
-//! the steps of its session.
+//! A step after which a person has to look ends the steps of its session.
 
 use std::collections::VecDeque;
 
@@ -15,8 +14,6 @@ use crate::state::{
     FinishedJob, ProcessingJob, ProcessingOutcome, ProcessingStatus, ProcessingStep,
 };
 
-/// Jobs that can wait.
-const MAX_WAITING: usize = 200;
 /// How a job ended that was cancelled.
 const CANCELLED: &str = "cancelled by a person";
 /// Ended jobs that are remembered.
@@ -48,7 +45,6 @@ pub(super) struct ProcessingQueue {
     waiting: VecDeque<ProcessingJob>,
     current: Option<ProcessingJob>,
     finished: VecDeque<FinishedJob>,
-    is_rig_busy: bool,
     numbers: u64,
 }
 
@@ -67,10 +63,6 @@ impl ProcessingQueue {
             let already =
                 format!("{session} is being processed already: wait for it, or cancel it");
             return Err(CommandError::Busy(already));
-        }
-        if self.waiting.len() >= MAX_WAITING {
-            let full = format!("{MAX_WAITING} jobs wait already: let some of them end");
-            return Err(CommandError::Busy(full));
         }
         self.numbers += 1;
         self.waiting.push_back(ProcessingJob {
@@ -95,38 +87,24 @@ impl ProcessingQueue {
         self.jobs().any(|job| job.session == session)
     }
 
-    /// Takes a job out, or has its program ended. False if no job has that number.
-    pub(super) fn cancel(&mut self, number: u64) -> bool {
-        if let Some(current) = &mut self.current
-            && current.number == number
-        {
-            current.status = ProcessingStatus::Ending;
-            return true;
-        }
-        let at = self.waiting.iter().position(|job| job.number == number);
-        let Some(job) = at.and_then(|at| self.waiting.remove(at)) else {
-            return false;
-        };
-        self.remember(&job, ProcessingOutcome::Cancelled, CANCELLED);
-        true
+    /// Takes a job out; returns how it ended, as it is shown. `None` if there is none of that kind.
+    pub(super) fn cancel(&mut self, which: impl Fn(&ProcessingJob) -> bool) -> Option<String> {
+        let job = self.current.take_if(|job| which(job)).or_else(|| {
+            let at = self.waiting.iter().position(&which)?;
+            self.waiting.remove(at)
+        })?;
+        Some(self.remember(&job, ProcessingOutcome::Cancelled, CANCELLED))
     }
 
-    /// Cancels all of a session.
-    pub(super) fn cancel_session(&mut self, session: &str) {
-        let of_session = self.jobs().filter(|job| job.session == session);
-        let numbers: Vec<u64> = of_session.map(|job| job.number).collect();
-        for number in numbers {
-            self.cancel(number);
-        }
+    /// Whether a job was begun and has not ended.
+    pub(super) fn is_under_way(&self) -> bool {
+        self.current.is_some()
     }
 
-    /// The rig captures or moves, or rests.
-    pub(super) fn set_rig_busy(&mut self, is_busy: bool) {
-        self.is_rig_busy = is_busy;
-        if let Some(current) = &mut self.current
-            && current.status != ProcessingStatus::Ending
-        {
-            current.status = if is_busy {
+    /// The program under way is held while the rig captures or moves.
+    pub(super) fn set_held(&mut self, is_held: bool) {
+        if let Some(current) = &mut self.current {
+            current.status = if is_held {
                 ProcessingStatus::Held
             } else {
                 ProcessingStatus::Running
@@ -134,30 +112,11 @@ impl ProcessingQueue {
         }
     }
 
-    /// What begins now, if anything does.
-    pub(super) fn begin(&mut self) -> Option<ProcessingJob> {
-        if self.is_rig_busy || self.current.is_some() {
-            return None;
-        }
+    /// What begins now, if anything waits.
+    pub(super) fn begin(&mut self) -> Option<&ProcessingJob> {
         let mut job = self.waiting.pop_front()?;
         job.status = ProcessingStatus::Running;
-        self.current = Some(job.clone());
-        Some(job)
-    }
-
-    /// Whether the program under way is to be held.
-    pub(super) fn should_pause(&self) -> bool {
-        self.is_current(ProcessingStatus::Held)
-    }
-
-    /// Whether the program under way is to end.
-    pub(super) fn is_cancelled(&self) -> bool {
-        self.is_current(ProcessingStatus::Ending)
-    }
-
-    fn is_current(&self, status: ProcessingStatus) -> bool {
-        let current = self.current.as_ref();
-        current.is_some_and(|current| current.status == status)
+        Some(self.current.insert(job))
     }
 
     /// The program under way has come so far.
@@ -168,26 +127,16 @@ impl ProcessingQueue {
     }
 
     /// The step under way has ended; returns how, as it is shown.
-    pub(super) fn finish(&mut self, end: StepOutcome) -> String {
-        let Some(mut job) = self.current.take() else {
-            return end.what;
-        };
-        let is_cancelled = job.status == ProcessingStatus::Ending;
-        // What was done before the cancel arrived is done.
-        let stopped = is_cancelled && end.outcome == ProcessingOutcome::Failed;
-        let (outcome, what) = if stopped {
-            (ProcessingOutcome::Cancelled, CANCELLED.to_owned())
-        } else {
-            (end.outcome, end.what)
-        };
-        self.remember(&job, outcome, &what);
-        if end.goes_on && !is_cancelled && !job.then.is_empty() {
+    pub(super) fn finish(&mut self, end: StepOutcome) -> Option<String> {
+        let mut job = self.current.take()?;
+        let line = self.remember(&job, end.outcome, &end.what);
+        if end.goes_on && !job.then.is_empty() {
             job.step = job.then.remove(0);
             job.status = ProcessingStatus::Waiting;
             (job.done, job.of) = (0, 0);
             self.waiting.push_front(job);
         }
-        what
+        Some(line)
     }
 
     /// Forgets how masks of this session came out: a person has made another one.
@@ -196,7 +145,7 @@ impl ProcessingQueue {
             .retain(|job| job.session != session || job.step != ProcessingStep::Mask);
     }
 
-    fn remember(&mut self, job: &ProcessingJob, outcome: ProcessingOutcome, what: &str) {
+    fn remember(&mut self, job: &ProcessingJob, outcome: ProcessingOutcome, what: &str) -> String {
         if self.finished.len() == REMEMBERED {
             self.finished.pop_front();
         }
@@ -207,6 +156,7 @@ impl ProcessingQueue {
             outcome,
             what: what.to_owned(),
         });
+        format!("{}: {}: {what}", job.session, job.step)
     }
 
     /// The jobs that ended last, newest last.
@@ -230,7 +180,7 @@ mod tests {
 
     fn begun(queue: &mut ProcessingQueue) -> Option<(String, ProcessingStep)> {
         let begun = queue.begin()?;
-        Some((begun.session, begun.step))
+        Some((begun.session.clone(), begun.step))
     }
 
     const GOOD: ProcessingOutcome = ProcessingOutcome::Good;
@@ -248,7 +198,6 @@ mod tests {
         ] {
             let (session, step) = begun(&mut queue).unwrap();
             assert_eq!((session.as_str(), step), wanted);
-            assert_eq!(begun(&mut queue), None, "one at a time");
             queue.finish(end(GOOD, true));
         }
         assert_eq!(begun(&mut queue), None);
@@ -266,61 +215,20 @@ mod tests {
     }
 
     #[test]
-    fn nothing_begins_while_the_rig_is_busy_and_what_is_under_way_is_held() {
-        let mut queue = ProcessingQueue::default();
-        queue.set_rig_busy(true);
-        queue.submit("mug", &[Mask, Check]).unwrap();
-        assert_eq!(begun(&mut queue), None);
-        assert!(!queue.should_pause(), "there is nothing to hold");
-        queue.set_rig_busy(false);
-        begun(&mut queue).unwrap();
-        assert!(!queue.should_pause());
-        queue.set_rig_busy(true);
-        assert!(queue.should_pause());
-        assert_eq!(queue.jobs().next().unwrap().status, ProcessingStatus::Held);
-        // A program may end just before it is held.
-        queue.finish(end(GOOD, true));
-        assert_eq!(
-            begun(&mut queue),
-            None,
-            "the next step waits for the rig too"
-        );
-        queue.set_rig_busy(false);
-        assert_eq!(begun(&mut queue), Some(("mug".to_owned(), Check)));
-    }
-
-    #[test]
     fn what_is_cancelled_ends_and_nothing_follows_it() {
         let mut queue = ProcessingQueue::default();
         let mug = queue.submit("mug", &[Mask, Check]).unwrap();
-        let cow = queue.submit("cow", &[Mask]).unwrap();
+        queue.submit("cow", &[Mask]).unwrap();
         begun(&mut queue).unwrap();
-        queue.set_rig_busy(true);
-        assert!(queue.cancel(mug) && queue.cancel(cow));
-        assert!(
-            queue.is_cancelled() && !queue.should_pause(),
-            "it has to run to end"
-        );
-        assert_eq!(queue.jobs().count(), 1);
-        assert_eq!(
-            queue.jobs().next().unwrap().status,
-            ProcessingStatus::Ending
-        );
-        queue.finish(end(ProcessingOutcome::Failed, false));
-        assert!(queue.jobs().next().is_none() && !queue.cancel(mug));
+        queue.set_held(true);
+        assert_eq!(queue.jobs().next().unwrap().status, ProcessingStatus::Held);
+        assert!(queue.cancel(|job| job.number == mug).is_some() && !queue.is_under_way());
+        assert!(queue.cancel(|job| job.session == "cow").is_some());
+        assert!(queue.jobs().next().is_none());
+        assert!(queue.cancel(|job| job.number == mug).is_none());
+        assert_eq!(queue.finish(end(GOOD, true)), None);
         let outcomes: Vec<_> = queue.finished().iter().map(|job| job.outcome).collect();
         assert_eq!(outcomes, [ProcessingOutcome::Cancelled; 2]);
-    }
-
-    #[test]
-    fn a_step_that_was_done_before_its_cancel_arrived_counts_as_done() {
-        let mut queue = ProcessingQueue::default();
-        let number = queue.submit("mug", &[Mask, Check]).unwrap();
-        begun(&mut queue).unwrap();
-        queue.cancel(number);
-        queue.finish(end(GOOD, true));
-        assert_eq!(queue.finished()[0].outcome, GOOD);
-        assert_eq!(begun(&mut queue), None);
     }
 
     #[test]
@@ -341,17 +249,5 @@ mod tests {
             matches!(nothing, Err(CommandError::Invalid(_))),
             "{nothing:?}"
         );
-        queue.cancel_session("mug");
-        assert!(queue.jobs().next().is_none());
-    }
-
-    #[test]
-    fn the_queue_has_an_end() {
-        let mut queue = ProcessingQueue::default();
-        for n in 0..MAX_WAITING {
-            queue.submit(&n.to_string(), &[Mask]).unwrap();
-        }
-        let full = queue.submit("mug", &[Mask]);
-        assert!(matches!(full, Err(CommandError::Busy(_))), "{full:?}");
     }
 }

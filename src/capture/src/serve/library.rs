@@ -89,14 +89,14 @@ pub(super) struct VideoFile {
 /// The sessions under one folder.
 pub(super) struct Library {
     pub(super) root: PathBuf,
-    /// Where their data set is, which a person may change.
-    dataset: Box<dyn Fn() -> PathBuf + Send + Sync>,
+    /// Where their data set is.
+    dataset: PathBuf,
     /// Summaries by folder, and the version of the manifest that each was made from.
     summaries: Cache<(PathBuf, FileVersion), SessionSummary>,
 }
 
 impl Library {
-    pub(super) fn new(root: PathBuf, dataset: Box<dyn Fn() -> PathBuf + Send + Sync>) -> Self {
+    pub(super) fn new(root: PathBuf, dataset: PathBuf) -> Self {
         Self {
             root,
             dataset,
@@ -115,7 +115,7 @@ impl Library {
         names.retain(|name| before.is_none_or(|before| name.as_str() < before));
         names.retain(|name| day.is_none_or(|day| name.starts_with(day)));
         names.truncate(most);
-        let made = entries_in(&(self.dataset)());
+        let made = entries_in(&self.dataset);
         let listed = names.iter().filter_map(|name| {
             let mut summary = self.summary(&self.root, name)?;
             summary.results = Some(results_of(&self.root.join(name), &made));
@@ -159,7 +159,7 @@ impl Library {
         let manifest = read_manifest(&folder).map_err(Failure::internal)?;
         let index = read_index(&folder, &manifest);
         let mut summary = summarise(id, &manifest, index.as_ref());
-        summary.results = Some(results_of(&folder, &entries_in(&(self.dataset)())));
+        summary.results = Some(results_of(&folder, &entries_in(&self.dataset)));
         let json = manifest
             .to_json()
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
@@ -221,15 +221,15 @@ impl Library {
     /// The page about a session in the data set.
     pub(super) fn report_page(&self, id: &str) -> Result<Vec<u8>, Failure> {
         self.folder(id)?;
-        let path = (self.dataset)().join(format!("{id}.html"));
+        let path = self.dataset.join(format!("{id}.html"));
         fs::read(path).map_err(|_| Failure::not_found(format!("{id} is not in the data set")))
     }
 
     /// The file with a session's samples in the data set.
     pub(super) fn shard_file(&self, id: &str) -> Result<PathBuf, Failure> {
         self.folder(id)?;
-        let folder = (self.dataset)();
-        let dataset = Dataset::read(&folder).ok();
+        let folder = &self.dataset;
+        let dataset = Dataset::read(folder).ok();
         let shard = dataset.and_then(|dataset| {
             let mut shards = dataset.shards_of(id);
             shards.next().map(|shard| folder.join(&shard.file))

@@ -46,14 +46,14 @@ impl App {
     ) -> Self {
         let root = rig.root().to_owned();
         let beside = root.with_file_name("dataset");
-        let worker = processing.clone();
-        let dataset = move || worker.as_ref().map_or(beside.clone(), |it| it.dataset());
+        let dataset = processing.as_ref();
+        let dataset = dataset.map_or(beside, |processing| processing.dataset().to_owned());
         Self {
             monitor: rig.monitor().clone(),
             policy,
             limits,
             permits: Arc::new(Permits::new(&limits)),
-            library: Arc::new(Library::new(root, Box::new(dataset))),
+            library: Arc::new(Library::new(root, dataset)),
             pictures: Arc::new(Pictures::new()),
             shutdown,
             processing,
@@ -98,7 +98,7 @@ pub(super) fn router(app: &App) -> Router {
         .route("/api/v1/processing/editor", delete(editor::close))
         .route("/", get(relit_web::index))
         .route("/edit", get(editor::with_slash))
-        .route(editor::PLACE, get(editor::pass_on))
+        .route(editor::PLACE, get(editor::page))
         .route("/edit/{*path}", any(editor::pass_on));
     for asset in &page::ASSETS {
         router = router.route(asset.path, get(async || asset.answer()));

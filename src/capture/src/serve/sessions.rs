@@ -75,7 +75,9 @@ pub(super) async fn move_to_trash(
 ) -> Result<StatusCode, Failure> {
     let done = permits.run(Work::Command, move || {
         library.ended(&id)?;
-        processing.map_or(Ok(()), |processing| processing.release(&id))?;
+        if let Some(processing) = processing {
+            processing.release(&id);
+        }
         library.move_to_trash(&id)
     });
     done.await.map(|()| StatusCode::NO_CONTENT)

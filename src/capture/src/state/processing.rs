@@ -36,8 +36,6 @@ pub enum ProcessingStatus {
     Running,
     /// Its program is held while the rig captures or moves.
     Held,
-    /// It was cancelled, and its program ends.
-    Ending,
 }
 
 /// Something that waits or is done just now.

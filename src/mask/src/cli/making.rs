@@ -46,7 +46,7 @@ fn draw(
     let request = arguments.request()?;
     let output = inputs.files_of(&path, arguments.output.as_ref())?;
     let announce = |announcement: &Announcement| print_editor(announcement, console);
-    match edit(&path, output, request, arguments.listen.socket(), announce)? {
+    match edit(&path, output, &request, arguments.listen.socket(), announce)? {
         Some(output) => {
             print(&path, &output, console);
             Ok(Outcome::Success)

@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::extract::{FromRef, Path, State};
 use axum::http::{StatusCode, header};
-use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
@@ -12,8 +11,8 @@ use relit_data::causes::with_causes;
 use relit_grabcut::{Effort, outline};
 use relit_video::VideoError;
 use relit_web::{
-    AccessPolicy, BodyLimit, Failure, IndexPage, JsonBody, PageAsset, QueryParams, SCRIPT, SKETCH,
-    STYLE, Shutdown, asset, guard,
+    BodyLimit, Failure, IndexPage, JsonBody, PageAsset, QueryParams, SCRIPT, SKETCH, SKETCH_LIMIT,
+    STYLE, Shutdown, asset,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -24,7 +23,7 @@ use super::super::{MaskRecord, MaskingError};
 use super::session::{EditorSession, Sketch};
 
 /// The page itself.
-pub(super) const INDEX: IndexPage = IndexPage(include_str!("page/index.html"));
+pub(crate) const INDEX: IndexPage = IndexPage(include_str!("page/index.html"));
 /// Its files that are not shared with other pages.
 const ASSETS: [PageAsset; 3] = [
     asset("/editor.css", STYLE, include_str!("page/editor.css")),
@@ -52,12 +51,15 @@ pub(super) type Accepted = Arc<Mutex<Option<MaskRecord>>>;
 #[derive(Clone, FromRef)]
 pub(super) struct App {
     pub(super) session: Arc<EditorSession>,
-    pub(super) policy: Arc<AccessPolicy>,
-    pub(super) shutdown: Shutdown,
+    pub(super) over: Shutdown,
     pub(super) accepted: Accepted,
     pub(super) permits: Arc<Semaphore>,
-    pub(super) index: IndexPage,
-    pub(super) limit: BodyLimit,
+}
+
+impl FromRef<App> for BodyLimit {
+    fn from_ref(_: &App) -> Self {
+        SKETCH_LIMIT
+    }
 }
 
 impl App {
@@ -78,10 +80,9 @@ impl App {
     }
 }
 
-/// Everything that is served.
-pub(super) fn router(app: &App) -> Router {
+/// Everything that is served, without the page itself.
+pub(super) fn router(app: App) -> Router {
     let mut router = Router::new()
-        .route("/", get(relit_web::index))
         .route("/api/v1/recording", get(recording))
         .route("/api/v1/frames/{number}", get(frame))
         .route("/api/v1/mask", post(mask))
@@ -92,8 +93,7 @@ pub(super) fn router(app: &App) -> Router {
     }
     router
         .fallback(async || Failure::not_found("there is nothing at this path"))
-        .layer(from_fn_with_state(app.clone(), guard))
-        .with_state(app.clone())
+        .with_state(app)
 }
 
 fn failure(error: MaskingError) -> Failure {
@@ -168,11 +168,11 @@ async fn accept(
         "warnings": record.warnings,
     });
     *app.accepted.lock().unwrap_or_else(PoisonError::into_inner) = Some(record);
-    app.shutdown.cancel();
+    app.over.cancel();
     Ok(Json(accepted))
 }
 
-async fn discard(State(shutdown): State<Shutdown>) -> StatusCode {
-    shutdown.cancel();
+async fn discard(State(over): State<Shutdown>) -> StatusCode {
+    over.cancel();
     StatusCode::NO_CONTENT
 }

@@ -2,8 +2,8 @@
 //! whole turn, and accepts it.
 //!
 //! The page keeps what was drawn, with its history, and sends all of it with every request: the server
-//! has no state but caches. It serves one person on one recording, and ends when the mask is accepted
-//! or discarded. Without the random token of its URL nothing is shown or done.
+//! has no state but caches. It serves one person on one recording, and is over when the mask is accepted
+//! or discarded. [`edit`] serves it by itself, behind a random token; another server can serve a [`MaskEditor`] as well.
 
 mod api;
 mod session;
@@ -12,86 +12,128 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::{Arc, PoisonError};
 
-use relit_data::session::Recording;
+use axum::Router;
+use axum::extract::FromRef;
+use axum::middleware::from_fn_with_state;
+use axum::routing::get;
+use relit_data::session::{Notice, Recording};
 use relit_video::Video;
-use relit_web::{Announcement, Shutdown, Token, serve_page};
+use relit_web::{AccessPolicy, Announcement, IndexPage, Shutdown, Token, guard, index, serve_page};
 use tokio::sync::Semaphore;
 
 use super::earlier::{check_same_input, with_strokes};
 use super::files::{check_replaceable, make_folder};
 use super::making::files_of;
-use super::{MaskFiles, MaskOutput, MaskRecord, MaskRequest, MaskingError};
-use api::{Accepted, App};
+use super::{MaskFiles, MaskOutput, MaskRequest, MaskingError};
+use api::App;
 use session::EditorSession;
 
 /// Frames decoded, and masks cut, at once.
 const AT_ONCE: usize = 2;
 
-/// Serves the editor at `address`, whose port may be 0 for any free one, for the recording at `input`, a session folder or a video file, until a person accepts a
-/// mask or discards it. The request says what is drawn at the beginning, and may be empty. `announce` is called
-/// once, when a browser can connect. relit's engine cuts, whichever the request names. The files are those of [`make_mask`](super::make_mask), and none is
-/// written before the mask is accepted; the result is `None` if it was discarded.
+/// The editor of one recording's mask, for a server to show.
+pub struct MaskEditor {
+    recording: String,
+    files: MaskFiles,
+    notices: Vec<Notice>,
+    app: App,
+}
+
+impl MaskEditor {
+    /// The editor's page, to be served at the root of its [`router`](Self::router).
+    pub const PAGE: IndexPage = api::INDEX;
+
+    /// Opens the recording at `input`, a session folder or a video file. The request says what is drawn at the
+    /// beginning, and may be empty. relit's engine cuts, whichever the request names. The files are those of
+    /// [`make_mask`](super::make_mask), and none is written before the mask is accepted.
+    ///
+    /// # Errors
+    /// [`MaskingError::Session`] without a recording, or what is wrong with it.
+    pub fn open(
+        input: &Path,
+        output: Option<MaskFiles>,
+        request: &MaskRequest,
+    ) -> Result<Self, MaskingError> {
+        let recording = Recording::open(input)?;
+        let files = files_of(&recording, output)?;
+        let _made = make_folder(&files)?;
+        check_replaceable(&files, request.force)?;
+        let video = Video::open(&recording.video)?;
+        if !request.force {
+            check_same_input(&files, &recording, &video)?;
+        }
+        let (request, notice) = with_strokes(request, &files, &video)?;
+        let request = request.into_owned();
+        let session = EditorSession::new(&recording, video, files.clone(), request)?;
+        Ok(Self {
+            recording: recording.id,
+            files,
+            notices: recording.notices.into_iter().chain(notice).collect(),
+            app: App {
+                session: Arc::new(session),
+                over: Shutdown::new(),
+                accepted: Arc::default(),
+                permits: Arc::new(Semaphore::new(AT_ONCE)),
+            },
+        })
+    }
+
+    /// All that is served but the page. Who gets in is for the server to say.
+    pub fn router(&self) -> Router {
+        api::router(self.app.clone())
+    }
+
+    /// Whether the mask was accepted or discarded.
+    pub fn is_over(&self) -> bool {
+        self.app.over.is_cancelled()
+    }
+
+    /// The mask that was written, once it was accepted.
+    pub fn accepted(&self) -> Option<MaskOutput> {
+        let accepted = self.app.accepted.lock();
+        let record = accepted.unwrap_or_else(PoisonError::into_inner).clone()?;
+        Some(MaskOutput {
+            recording: self.recording.clone(),
+            files: self.files.clone(),
+            record,
+            notices: self.notices.clone(),
+        })
+    }
+}
+
+/// Who gets in, and what is shown first.
+#[derive(Clone, FromRef)]
+struct Entrance {
+    policy: Arc<AccessPolicy>,
+    index: IndexPage,
+}
+
+/// Serves the editor at `address`, whose port may be 0 for any free one, until a person accepts a mask or discards it.
+/// `announce` is called once, when a browser can connect. The result is `None` if it was discarded.
 ///
 /// # Errors
-/// [`MaskingError::Session`] without a recording, [`MaskingError::Serve`], or what went wrong with it.
+/// As [`MaskEditor::open`], and [`MaskingError::Serve`].
 pub fn edit(
     input: &Path,
     output: Option<MaskFiles>,
-    request: MaskRequest,
+    request: &MaskRequest,
     address: SocketAddr,
     announce: impl FnOnce(&Announcement),
 ) -> Result<Option<MaskOutput>, MaskingError> {
-    let recording = Recording::open(input)?;
-    let files = files_of(&recording, output)?;
-    let _made = make_folder(&files)?;
-    check_replaceable(&files, request.force)?;
-    let video = Video::open(&recording.video)?;
-    if !request.force {
-        check_same_input(&files, &recording, &video)?;
-    }
-    let (request, notice) = with_strokes(&request, &files, &video)?;
-    let request = request.into_owned();
-    let session = EditorSession::new(&recording, video, files.clone(), request)?;
-    let record = serve(session, address, announce)?;
-    Ok(record.map(|record| MaskOutput {
-        recording: recording.id,
-        files,
-        record,
-        notices: recording.notices.into_iter().chain(notice).collect(),
-    }))
-}
-
-fn serve(
-    session: EditorSession,
-    address: SocketAddr,
-    announce: impl FnOnce(&Announcement),
-) -> Result<Option<MaskRecord>, MaskingError> {
+    let editor = MaskEditor::open(input, output, request)?;
     let failed = |source| MaskingError::Serve { address, source };
     let token = Some(Token::random().map_err(failed)?);
-    let shutdown = Shutdown::new();
-    let (session, accepted) = (Arc::new(session), Accepted::default());
-    let router = |policy| {
-        api::router(&App {
-            session,
-            policy,
-            shutdown: shutdown.clone(),
-            accepted: accepted.clone(),
-            permits: Arc::new(Semaphore::new(AT_ONCE)),
-            index: api::INDEX,
-            limit: relit_web::SKETCH_LIMIT,
-        })
+    let router = |policy: Arc<AccessPolicy>| {
+        let entrance = Entrance {
+            policy: policy.clone(),
+            index: MaskEditor::PAGE,
+        };
+        let page = Router::new().route("/", get(index)).with_state(entrance);
+        page.merge(editor.router())
+            .layer(from_fn_with_state(policy, guard))
     };
-    let paths = api::page_paths();
-    serve_page(
-        address,
-        token,
-        Vec::new(),
-        &paths,
-        router,
-        announce,
-        &shutdown,
-    )
-    .map_err(failed)?;
-    let accepted = accepted.lock();
-    Ok(accepted.unwrap_or_else(PoisonError::into_inner).take())
+    let (names, paths) = (Vec::new(), api::page_paths());
+    let over = &editor.app.over;
+    serve_page(address, token, names, &paths, router, announce, over).map_err(failed)?;
+    Ok(editor.accepted())
 }

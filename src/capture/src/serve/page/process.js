@@ -9,7 +9,7 @@ const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "E
 const DONE = { mask: "Mask", check: "Check", extract: "Extraction" };
 const ORIGINS = { turn: "automatic", hints: "drawn by hand", hand: "from another program" };
 const CHECKS = { fits: "the mask fits", wrong: "the mask is wrong", unknown: "not certain" };
-const STATUS = { waiting: "waiting", running: "", held: "paused while the rig is busy", ending: "stopping" };
+const STATUS = { waiting: "waiting", running: "", held: "paused while the rig is busy" };
 
 let processing = null;
 /** The session in the player, as the server described it last. */
@@ -97,7 +97,6 @@ function showJob() {
   if (job) {
     $("job-text").textContent = [STEPS[job.step], STATUS[job.status]].filter(Boolean).join(": ");
     advance($("job-progress"), job);
-    $("job-cancel").disabled = job.status === "ending";
     $("job-cancel").onclick = () => order("DELETE", `/api/v1/processing/jobs/${job.number}`);
   }
   const last = processing?.finished.findLast(({ session }) => session === id);
@@ -108,7 +107,7 @@ function showJob() {
   const ended = status === "complete" || status === "aborted";
   const idle = ended && !job;
   const [canMask, canExtract] = [idle && !isMissing("mask"), idle && !isMissing("extract")];
-  for (const [button, on] of [["make-mask", canMask], ["edit-mask", canMask], ["make-check", canMask && results.mask], ["make-extract", canExtract && results.mask]]) $(button).disabled = !on;
+  for (const [button, on] of [["make-mask", canMask], ["edit-mask", idle], ["make-check", canMask && results.mask], ["make-extract", canExtract && results.mask]]) $(button).disabled = !on;
   $("make-mask").textContent = results.mask ? "Make again" : "Make";
   $("make-check").textContent = results.check ? "Check again" : "Check";
   $("make-extract").textContent = results.extraction ? "Extract again" : "Extract";
@@ -145,12 +144,12 @@ function showSettings() {
   $("dataset-folder").textContent = folder;
   const missing = [isMissing("mask") && "relit-mask", isMissing("extract") && "relit-extract"].filter(Boolean);
   $("missing").hidden = missing.length === 0;
-  $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there, or process the sessions on another computer.`;
+  $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there and restart relit-capture, or process the sessions on another computer.`;
 }
 
 function showQueue() {
   const lines = processing.jobs.map((job) => {
-    const cancel = make("button", { type: "button", text: "Cancel", disabled: job.status === "ending", ariaLabel: `Cancel: ${STEPS[job.step]} ${job.session}` });
+    const cancel = make("button", { type: "button", text: "Cancel", ariaLabel: `Cancel: ${STEPS[job.step]} ${job.session}` });
     cancel.addEventListener("click", () => order("DELETE", `/api/v1/processing/jobs/${job.number}`));
     const bar = make("progress", { max: 1 });
     advance(bar, job);

@@ -1,12 +1,9 @@
 //! Sessions processed by programs that only pretend: scripts that the tests write.
 
 use std::fs;
-use std::io::{Read, Write};
-use std::net::TcpListener;
 use std::path::Path;
 use std::process::Command;
-use std::sync::{Arc, mpsc};
-use std::thread;
+use std::sync::Arc;
 
 use relit_data::geometry::Rect;
 use relit_data::shard::{
@@ -16,7 +13,7 @@ use relit_data::shard::{
 use serde_json::{Value, json};
 
 use super::{Fake, Serving, wait_until};
-use crate::processing::{Processing, ProcessingOptions, ProcessingPrograms};
+use crate::processing::{Processing, ProcessingPrograms};
 use crate::state::{Phase, TakeSummary, Verdict};
 
 const COW: &str = "20261120T101500Z-cow-short";
@@ -74,12 +71,9 @@ fn written(folder: &Path, scripts: Scripts<'_>) -> ProcessingPrograms {
 }
 
 fn start(rig: &Fake, programs: &ProcessingPrograms) -> Arc<Processing> {
-    let programs = programs.clone();
-    let options = ProcessingOptions {
-        datasets: Some(rig.root.join(".sets")),
-        programs: Box::new(move || programs.clone()),
-    };
-    Arc::new(Processing::start(&rig.root, rig.monitor.clone(), options).unwrap())
+    let sets = Some(rig.root.join(".sets"));
+    let started = Processing::start(&rig.root, rig.monitor.clone(), sets, programs.clone());
+    Arc::new(started.unwrap())
 }
 
 /// A server that processes sessions by scripts in a folder.
@@ -323,21 +317,14 @@ fn where_a_program_is_missing_nothing_is_queued() {
         let program = format!("relit-{}", steps[0]);
         assert!(refused.error().contains(&program), "{}", refused.error());
     }
-    let edit = format!("/api/v1/sessions/{COW}/edit");
-    assert_eq!(serving.ask("POST", &edit, &[], b"").status, 503);
     assert_eq!(state(&serving)["has_mask_program"], json!(false));
 }
 
 #[test]
 fn what_became_of_an_automatic_mask_is_forgotten_once_a_person_has_made_one() {
     let folder = tempfile::tempdir().unwrap();
-    let editor = r#"case "$*" in
-        *--edit*) echo '{"event":"editor","address":"127.0.0.1:9","url":"http://127.0.0.1:9/?token=secret"}'
-            echo '{"event":"mask","input":"","mask":"","preview":"","record":"","result":{},"session":"","source":{},"warnings":[]}';;
-        *) exit 1;;
-    esac"#;
     let scripts = Scripts {
-        mask: Some(editor),
+        mask: Some("exit 1"),
         ..ALL_WELL
     };
     let serving = serving(folder.path(), scripts);
@@ -347,8 +334,14 @@ fn what_became_of_an_automatic_mask_is_forgotten_once_a_person_has_made_one() {
     assert_eq!(wait_finished(&serving, 2), steps(&[failed, failed]));
     let edit = format!("/api/v1/sessions/{COW}/edit");
     assert_eq!(serving.ask("POST", &edit, &[], b"").status, 200);
+    let sketch = json!({ "frame": 0, "auto": false, "rect": [170, 20, 300, 300], "strokes": [] });
+    let json = ["Content-Type: application/json"];
+    let sketch = sketch.to_string();
+    let accepted = serving.ask("POST", "/edit/api/v1/accept", &json, sketch.as_bytes());
+    assert_eq!(accepted.status, 200);
     wait_until("it is forgotten", || finished(&serving).len() == 1);
     assert_eq!(state(&serving)["finished"][0]["session"], BUST);
+    assert!(serving.root.path().join(COW).join("mask.png").is_file());
 }
 
 #[test]
@@ -543,40 +536,11 @@ fn a_session_that_is_put_away_is_no_longer_worked_on_and_its_trash_outlasts_a_re
     assert_eq!(serving.get(&path).status, 200);
 }
 
-/// What a request asked of an editor, which answers it.
-fn pretend_editor() -> (u16, mpsc::Receiver<String>) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = listener.local_addr().unwrap().port();
-    let (tell, told) = mpsc::sync_channel(8);
-    thread::spawn(move || {
-        for socket in listener.incoming() {
-            let mut socket = socket.unwrap();
-            let mut text = vec![0; 4096];
-            let read = socket.read(&mut text).unwrap();
-            let body = "cut";
-            let answer = format!(
-                "HTTP/1.1 200 OK\r\nContent-Type: text/plain\r\nSet-Cookie: a=b\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{body}",
-                body.len()
-            );
-            socket.write_all(answer.as_bytes()).unwrap();
-            let text = String::from_utf8_lossy(&text[..read]).into_owned();
-            if tell.send(text).is_err() {
-                return;
-            }
-        }
-    });
-    (port, told)
-}
-
 #[test]
 fn the_editor_is_reached_through_the_rig_by_those_whom_the_rig_lets_in() {
     let folder = tempfile::tempdir().unwrap();
-    let (port, told) = pretend_editor();
-    let editor = format!(
-        "echo '{{\"event\":\"editor\",\"address\":\"127.0.0.1:{port}\",\"url\":\"http://127.0.0.1:{port}/?token=secret\"}}'; {WAIT}"
-    );
     let scripts = Scripts {
-        mask: Some(&editor),
+        mask: None,
         ..ALL_WELL
     };
     let serving = serving(folder.path(), scripts);
@@ -585,50 +549,35 @@ fn the_editor_is_reached_through_the_rig_by_those_whom_the_rig_lets_in() {
         let path = format!("/api/v1/sessions/{session}/edit");
         serving.ask("POST", &path, &[], b"")
     };
-    let opened = edit(COW);
-    assert_eq!(opened.json()["path"], "/edit/");
+    assert_eq!(edit(COW).json()["path"], "/edit/");
     assert_eq!(edit(COW).status, 200, "it goes on");
     assert_eq!(edit(BUST).status, 409, "one at a time");
     assert_eq!(state(&serving)["editing"], COW);
-    let headers = ["Content-Type: application/json", "Cookie: relit-1=outer"];
-    let answer = serving.ask("POST", "/edit/api/v1/mask?draft=true", &headers, b"{}");
-    assert_eq!((answer.status, &*answer.body), (200, &b"cut"[..]));
-    assert_eq!(answer.header("set-cookie"), None);
-    assert!(answer.header("content-security-policy").is_some());
-    let asked = told.recv_timeout(super::LONG).unwrap().to_lowercase();
-    assert!(
-        asked.starts_with("post /api/v1/mask?draft=true http/1.1"),
-        "{asked}"
-    );
-    assert!(asked.contains("authorization: bearer secret"), "{asked}");
-    assert!(
-        asked.contains(&format!("host: 127.0.0.1:{port}")),
-        "{asked}"
-    );
-    assert!(!asked.contains("outer"), "{asked}");
-    let foreign = serving.ask(
-        "POST",
-        "/edit/api/v1/accept",
-        &["Origin: http://evil.example"],
-        b"{}",
-    );
+    assert_eq!(serving.get("/edit/").status, 200);
+    let picture = serving.get("/edit/api/v1/frames/0?width=64");
+    assert_eq!(picture.header("content-type"), Some("image/jpeg"));
+    assert!(picture.header("content-security-policy").is_some());
+    let sketch = json!({ "frame": 0, "auto": false, "rect": [170, 20, 300, 300], "strokes": [] });
+    let post = |path: &str, header: &str| {
+        let headers = ["Content-Type: application/json", header];
+        serving.ask("POST", path, &headers, sketch.to_string().as_bytes())
+    };
+    let cut = post("/edit/api/v1/mask?draft=true", "Accept: */*");
+    assert!(cut.json()["area_px"].as_u64().unwrap() > 0);
+    let foreign = post("/edit/api/v1/accept", "Origin: http://evil.example");
     assert_eq!(foreign.status, 403);
     let other = serving.ask("GET", "/edit/", &["Host: evil.example"], b"");
     assert_eq!(other.status, 421);
-    serving
-        .rig
-        .monitor
-        .update(|state| state.phase = Phase::Recording);
+    let phase = |phase| serving.rig.monitor.update(|state| state.phase = phase);
+    phase(Phase::Recording);
     assert_eq!(serving.get("/edit/").status, 503, "it is held");
     assert_eq!(edit(COW).status, 409);
-    wait_until("it is held", || {
-        state_of(folder.path()).as_deref() == Some("T")
-    });
-    serving
-        .rig
-        .monitor
-        .update(|state| state.phase = Phase::Idle);
-    fs::write(folder.path().join("go"), "").unwrap();
+    phase(Phase::Idle);
+    assert_eq!(
+        post("/edit/api/v1/discard", "Accept: */*").status,
+        204,
+        "it goes on"
+    );
     wait_until("it is over", || state(&serving)["editing"].is_null());
     assert_eq!(serving.get("/edit/").status, 503);
 }
