@@ -7,7 +7,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder as _, ImageError, RgbImage};
 
 use super::Page;
-use super::axis::{degrees, percent};
+use super::text::{degrees, percent};
 use super::turn::Turn;
 use crate::shard::record::FrameRecord;
 

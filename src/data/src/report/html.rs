@@ -1,6 +1,6 @@
-//! The document around a body, and text that is safe inside HTML, for any name of a
-//! session, an object or a path.
+//! The document around a body, its warnings and tables.
 
+use super::text::escape;
 use crate::shard::QualityVerdict;
 
 const STYLE: &str = include_str!("style.css");
@@ -21,44 +21,6 @@ pub(super) fn document(title: &str, body: &str) -> String {
 /// A verdict as a mark.
 pub(super) fn badge(verdict: QualityVerdict) -> String {
     format!("<b class=\"badge {verdict}\">{verdict}</b>")
-}
-
-/// `text` for an element's content or a quoted attribute: markup is escaped, and characters that
-/// HTML does not allow or that change the writing direction are replaced by U+FFFD.
-pub(super) fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            '\n' | '\t' => safe.push(' '),
-            c if c.is_control() || is_noncharacter(c) || is_direction_override(c) => {
-                safe.push('\u{fffd}');
-            }
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
-fn is_noncharacter(c: char) -> bool {
-    matches!(c, '\u{fdd0}'..='\u{fdef}') || u32::from(c) & 0xfffe == 0xfffe
-}
-
-fn is_direction_override(c: char) -> bool {
-    matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-}
-
-/// `no duplicates`, `1 duplicate`, `2 duplicates`, the number in bold.
-pub(super) fn counted(count: usize, noun: &str) -> String {
-    match count {
-        0 => format!("no {noun}s"),
-        1 => format!("<b>1</b> {noun}"),
-        _ => format!("<b>{count}</b> {noun}s"),
-    }
 }
 
 /// The warnings as a section; empty text if there are none.
@@ -86,27 +48,4 @@ pub(super) fn table(heading: &str, rows: &[(String, String)]) -> String {
         })
         .collect();
     format!("<section>\n<h2>{heading}</h2>\n<table>\n{body}</table>\n</section>\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn markup_in_a_name_becomes_text() {
-        let safe = escape("<b onclick='x'>\"&amp;\"</b>");
-        assert_eq!(
-            safe,
-            "&lt;b onclick=&#39;x&#39;&gt;&quot;&amp;amp;&quot;&lt;/b&gt;"
-        );
-    }
-
-    #[test]
-    fn other_scripts_pass_and_control_characters_do_not() {
-        assert_eq!(escape("Schüssel 碗 🐄"), "Schüssel 碗 🐄");
-        assert_eq!(
-            escape("a\0b\u{202e}c\nd\u{ffff}"),
-            "a\u{fffd}b\u{fffd}c d\u{fffd}"
-        );
-    }
 }

@@ -6,11 +6,11 @@
 //! This module knows the frame's record ([`crate::shard::record`]) and small RGB images. It knows nothing of videos,
 //! masks, shards or files: [`render`] returns text.
 
-mod axis;
 mod contact;
 mod html;
 mod plot;
 mod sections;
+mod text;
 mod turn;
 
 use image::{ImageError, RgbImage};

@@ -1,9 +1,9 @@
 //! The sections of the page, from the title to the tables.
 
 use super::Page;
-use super::axis::{degrees, number, percent};
-use super::html::{self, badge, counted, escape, table, warnings};
-use super::plot::{Level, Plot, Series};
+use super::html::{self, badge, table, warnings};
+use super::plot::Plot;
+use super::text::{counted, degrees, escape, number, percent};
 use super::turn::Turn;
 use crate::image_stats::fraction;
 use crate::shard::SessionQuality;
@@ -136,10 +136,7 @@ fn saturated(page: &Page<'_>, turn: &Turn) -> String {
     );
     let points = turn.points(page.records, |r| 100.0 * r.saturated_fraction);
     let plot = Plot {
-        level: Some(Level {
-            at: 100.0 * page.gate,
-            fraction: page.gate,
-        }),
+        gate: Some(page.gate),
         ..one_line(
             "saturated, all channels (% of the mask)",
             "all",
@@ -165,20 +162,12 @@ fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
 }
 
 fn colour(page: &Page<'_>, turn: &Turn) -> String {
-    let channel = |class, label, index: usize| Series {
-        class,
-        label,
-        points: turn.points(page.records, |r| r.mean_rgb[index]),
-    };
+    let channel = |class, index: usize| (class, turn.points(page.records, |r| r.mean_rgb[index]));
     let plot = Plot {
-        series: vec![
-            channel("r", "R", 0),
-            channel("g", "G", 1),
-            channel("b", "B", 2),
-        ],
+        series: vec![channel("r", 0), channel("g", 1), channel("b", 2)],
         ..one_line("mean colour (8-bit sRGB value)", "", Vec::new(), TALL)
     };
-    let caption = "Mean red (R), green (G) and blue (B) of the source pixels.";
+    let caption = "Mean red, green and blue of the source pixels.";
     figure(plot, turn, caption)
 }
 
@@ -199,18 +188,13 @@ fn one_line<'a>(
     points: Vec<(f64, f64)>,
     height: f64,
 ) -> Plot<'a> {
-    let label = "";
     Plot {
         alternative: "",
         quantity,
         abscissa: "",
         height,
-        series: vec![Series {
-            class,
-            label,
-            points,
-        }],
-        level: None,
+        series: vec![(class, points)],
+        gate: None,
     }
 }
 
