@@ -140,14 +140,15 @@ fn lines(turns: &[TurnScore]) -> [ScoreLine; 2] {
     let normals = |at: usize| mean(&|turn| turn.normals[at].1);
     let error = |at: usize| {
         let square = mean(&|turn| (turn.normals[at].1 - normals(at)).powi(2));
-        (square / (count - 1.0).max(1.0)).sqrt()
+        (square / (count - 1.0)).sqrt()
     };
     let mut measures: Vec<(&str, f64)> = Vec::new();
     for at in 0..turns.first().map_or(0, |turn| turn.normals.len()) {
         measures.push((turns[0].normals[at].0, normals(at)));
         match at {
-            0 => measures.push(("± mean", error(0))),
-            1 => measures.push(("± median", error(1))),
+            // Of one turn, there is no standard error.
+            0 if turns.len() > 1 => measures.push(("± mean", error(0))),
+            1 if turns.len() > 1 => measures.push(("± median", error(1))),
             _ => {}
         }
     }
