@@ -17,7 +17,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit_camera::manual_controls::{ManualPlan, ManualValues, NotHeld};
+use relit_camera::manual_controls::{ManualPlan, ManualValues};
 use relit_camera::{
     self as camera, Camera, CameraError, CameraMode, ControlKind, Fourcc, Frame, Rate, Rates,
 };
@@ -263,10 +263,10 @@ fn a_camera_is_made_to_hold_still() {
     };
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
-    let not_held = NotHeld {
-        without_control: vec!["exposure", "white balance"],
-        ..NotHeld::default()
-    };
+    let not_held = [
+        "exposure (without a control)",
+        "white balance (without a control)",
+    ];
     assert_eq!(plan.not_held, not_held);
     set(&mut *camera, "gain", 34);
     let moved = plan.check(&camera.controls().unwrap());

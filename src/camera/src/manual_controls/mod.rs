@@ -5,8 +5,6 @@
 //! controls and reads them back. The names are those that `v4l2-ctl` prints; the kernel renamed
 //! several in 5.17, and both names are known.
 
-use std::fmt;
-
 use relit_data::causes::with_causes;
 
 use super::{Camera, CameraError, Control, ControlKind};
@@ -148,41 +146,8 @@ pub struct ControlSetting {
 pub struct ManualPlan {
     /// In this order: first all automatics off, then the values, which automatics would refuse.
     pub steps: Vec<ControlSetting>,
-    /// What cannot be held.
-    pub not_held: NotHeld,
-}
-
-/// What a camera may change by itself during a turn, and why. As text it is one sentence.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct NotHeld {
-    /// Controls that the camera does not let be set.
-    pub locked: Vec<String>,
-    /// Properties of the picture that can be switched to manual, but have no value to set.
-    pub without_value: Vec<&'static str>,
-    /// Properties of the picture that the camera has no control for.
-    pub without_control: Vec<&'static str>,
-}
-
-impl NotHeld {
-    /// Whether all is held.
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-impl fmt::Display for NotHeld {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let parts = [
-            ("cannot be set", self.locked.join(", ")),
-            ("without a value to set", self.without_value.join(", ")),
-            ("without a control", self.without_control.join(", ")),
-        ];
-        let parts = parts.iter().filter(|(_, names)| !names.is_empty());
-        let parts: Vec<String> = parts
-            .map(|(why, names)| format!("{names} ({why})"))
-            .collect();
-        write!(f, "the camera may change by itself: {}", parts.join("; "))
-    }
+    /// What the camera may change by itself during a turn, each with why.
+    pub not_held: Vec<String>,
 }
 
 /// A control whose value is not what it should be.
@@ -208,22 +173,29 @@ impl ManualPlan {
         let mut plan = Self::default();
         let mut values = Vec::new();
         for aspect in &ASPECTS {
-            let before = plan.not_held.locked.len();
+            let before = plan.not_held.len();
             let (switched, is_manual) = plan.switch_off(controls, aspect);
             let held = plan.hold(controls, wanted, aspect, &mut values) || is_manual;
-            let is_locked = plan.not_held.locked.len() > before;
+            let is_locked = plan.not_held.len() > before;
             let has_automatic = switched && !aspect.values.is_empty();
             if (aspect.is_needed || has_automatic) && !held && !is_locked {
-                let not_held = if switched {
-                    &mut plan.not_held.without_value
-                } else {
-                    &mut plan.not_held.without_control
-                };
-                not_held.push(aspect.name);
+                let lacks = if switched { "value to set" } else { "control" };
+                plan.not_held
+                    .push(format!("{} (without a {lacks})", aspect.name));
             }
         }
         plan.steps.extend(values);
         plan
+    }
+
+    /// What cannot be held, in a sentence.
+    pub fn warning(&self) -> Option<String> {
+        let not_held = self.not_held.join(", ");
+        (!not_held.is_empty()).then(|| format!("the camera may change by itself: {not_held}"))
+    }
+
+    fn note_locked(&mut self, name: &str) {
+        self.not_held.push(format!("{name} (cannot be set)"));
     }
 
     /// Wanted values that are not in the plan, because the camera has no control for them: aspect
@@ -265,7 +237,7 @@ impl ManualPlan {
                 {
                     is_manual = true;
                 }
-                _ => self.not_held.locked.push(name.to_owned()),
+                _ => self.note_locked(name),
             }
         }
         (switched, is_manual)
@@ -289,7 +261,7 @@ impl ManualPlan {
                 continue;
             }
             if !may_be_set(control) {
-                self.not_held.locked.push(control.name.clone());
+                self.note_locked(&control.name);
                 continue;
             }
             let current = control.value.unwrap_or(control.default);

@@ -71,9 +71,8 @@ impl LockedCamera {
         let controls = camera.controls()?;
         require_kept(plan.check(&controls))?;
         checks.extend(settings_check(&plan));
-        if !plan.not_held.is_empty() {
-            checks.push(Check::noted("camera settings", plan.not_held.to_string()));
-        }
+        let warning = plan.warning();
+        checks.extend(warning.map(|warning| Check::noted("camera settings", warning)));
         let device = camera.info().address.to_string();
         let fourcc = mode.fourcc;
         let format = fourcc.pixel_format();

@@ -74,12 +74,11 @@ pub(super) fn manifest(
 
 /// What the camera may change by itself, which cannot be seen in the recording afterwards.
 fn not_held(locked: &LockedCamera) -> Vec<Fault> {
-    let not_held = &locked.plan.not_held;
-    let fault = (!not_held.is_empty()).then(|| Fault {
-        t_us: 0,
-        what: not_held.to_string(),
-    });
-    fault.into_iter().collect()
+    let warning = locked.plan.warning();
+    warning
+        .map(|what| Fault { t_us: 0, what })
+        .into_iter()
+        .collect()
 }
 
 fn facts_of(table: &Table, settings: &Settings) -> TurntableFacts {
