@@ -32,7 +32,7 @@ fn main() -> ExitCode {
         trouble::a_page_goes_on_with_a_rig_that_was_started_again,
         trouble::a_second_tap_on_start_is_no_stop,
         trouble::the_emergency_stop_comes_first_and_the_aborted_object_after_it,
-        where_the_programs_are_missing_the_page_says_so_and_offers_nothing,
+        where_the_programs_are_missing_the_page_says_so_and_offers_the_editor_alone,
         a_session_that_opens_offers_nothing_until_its_steps_are_known,
         a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object,
     ];
@@ -70,7 +70,7 @@ fn a_day_of_whole_turns(browser: PathBuf) {
     Day::begin(&rig, Phone::open(&browser, &rig.url, "day")).go_through();
 }
 
-fn where_the_programs_are_missing_the_page_says_so_and_offers_nothing(browser: PathBuf) {
+fn where_the_programs_are_missing_the_page_says_so_and_offers_the_editor_alone(browser: PathBuf) {
     let rig = Rig::start_without_programs(&SHORT_TURN);
     rig.hold_recorded();
     let mut phone = Phone::open(&browser, &rig.url, "alone");
@@ -78,8 +78,9 @@ fn where_the_programs_are_missing_the_page_says_so_and_offers_nothing(browser: P
     phone.wait_for("document.getElementById('when-done').disabled");
     phone.tap("#sessions li button");
     phone.wait_for("document.getElementById('make-mask').checkVisibility()");
-    for button in ["make-mask", "edit-mask", "make-check", "make-extract"] {
+    for button in ["make-mask", "make-check", "make-extract"] {
         phone.wait_for(&format!("document.getElementById('{button}').disabled"));
     }
+    phone.wait_for("!document.getElementById('edit-mask').disabled");
     phone.see("without-programs");
 }
