@@ -11,7 +11,7 @@ use super::SynthError;
 use super::lighting::Panoramas;
 use super::lighting::studio::Surroundings;
 use super::mesh::{Mesh, NOT_READ};
-use super::pack::{self, LibraryContents, LibraryFilter};
+use super::pack::{self, PackedLibrary};
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
@@ -73,9 +73,14 @@ impl Library {
     /// # Errors
     /// If a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
-        let packed = LibraryContents::from_folders(folders)?;
+        let mut is_for_validation = BTreeMap::new();
+        let mut packed = |path: &Path| {
+            let packed = PackedLibrary::read(path)?;
+            is_for_validation.extend(packed.is_for_validation());
+            Ok::<_, SynthError>(packed)
+        };
         let (meshes, left_out) = match &folders.meshes {
-            Some(path) if pack::is_packed(path) => (packed.meshes, Vec::new()),
+            Some(path) if pack::is_packed(path) => (packed(path)?.meshes()?, Vec::new()),
             Some(folder) => read_meshes(folder)?,
             None => (Vec::new(), Vec::new()),
         };
@@ -84,7 +89,7 @@ impl Library {
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
-            Some(path) if pack::is_packed(path) => packed.panoramas,
+            Some(path) if pack::is_packed(path) => packed(path)?.panoramas()?,
             Some(folder) => read_all(folder, &PANORAMAS, |path| {
                 Panorama::read(path).map_err(SynthError::Image)
             })?,
@@ -98,7 +103,7 @@ impl Library {
             pictures,
             panoramas: Panoramas::new(panoramas),
             left_out,
-            is_for_validation: packed.is_for_validation,
+            is_for_validation,
         };
         library.checked("all panoramas are black: give one with light")
     }
@@ -108,14 +113,15 @@ impl Library {
     /// # Errors
     /// [`SynthError::Unusable`] if it is damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
-        let contents = pack::read(path, bytes, LibraryFilter::ALL)?;
-        let pictures = contents.panoramas.iter();
+        let packed = PackedLibrary::from_bytes(path, bytes)?;
+        let panoramas = packed.panoramas()?;
+        let pictures = panoramas.iter();
         Ok(Self {
             pictures: pictures.map(|(_, panorama)| picture_of(panorama)).collect(),
-            meshes: contents.meshes,
-            panoramas: Panoramas::new(contents.panoramas),
+            meshes: packed.meshes()?,
+            panoramas: Panoramas::new(panoramas),
             left_out: Vec::new(),
-            is_for_validation: contents.is_for_validation,
+            is_for_validation: packed.is_for_validation().collect(),
         })
     }
 
@@ -173,32 +179,6 @@ impl Library {
             left_out: Vec::new(),
             is_for_validation: self.is_for_validation.clone(),
         }
-    }
-}
-
-impl LibraryContents {
-    /// The wanted part of packed libraries given in place of folders; each is read once.
-    fn from_folders(folders: &Folders) -> Result<Self, SynthError> {
-        let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
-        let (meshes, panoramas) = (packed(&folders.meshes), packed(&folders.panoramas));
-        let mut contents = Self::default();
-        let paths: BTreeSet<&PathBuf> = meshes.iter().chain(&panoramas).collect();
-        for path in paths {
-            let bytes = fs::read(path).map_err(SynthError::read(path))?;
-            let wanted = LibraryFilter {
-                meshes: meshes.as_ref() == Some(path),
-                panoramas: panoramas.as_ref() == Some(path),
-            };
-            let read = pack::read(path, &bytes, wanted)?;
-            if wanted.meshes {
-                contents.meshes = read.meshes;
-            }
-            if wanted.panoramas {
-                contents.panoramas = read.panoramas;
-            }
-            contents.is_for_validation.extend(read.is_for_validation);
-        }
-        Ok(contents)
     }
 }
 

@@ -36,7 +36,7 @@ enum Texels {
 }
 
 /// What the values of a mesh's picture are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum PictureKind {
     /// sRGB.
     Colours,
