@@ -1,4 +1,4 @@
-//! What a user brings: meshes, textures and panoramas, read once.
+//! What a user brings: meshes and panoramas, read once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
@@ -30,7 +30,7 @@ const VARIANTS: u64 = 4;
 pub struct Library {
     /// By file name, with its folders; empty: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
-    /// Textures, and panoramas as textures.
+    /// The panoramas as textures.
     pub(crate) pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
@@ -60,8 +60,6 @@ impl fmt::Display for SkippedFile {
 pub struct Folders {
     /// `.obj`, `.gltf` and `.glb`, also in folders within it.
     pub meshes: Option<PathBuf>,
-    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB by default.
-    pub textures: Option<PathBuf>,
     /// `.hdr` and `.exr`; `None`: the synthetic ones.
     pub panoramas: Option<PathBuf>,
 }
@@ -84,24 +82,16 @@ impl Library {
             Some(folder) => read_meshes(folder)?,
             None => (Vec::new(), Vec::new()),
         };
-        let textures = match &folders.textures {
-            Some(folder) => read_all(folder, &TEXTURES, TextureImage::read)?,
-            None => Vec::new(),
-        };
         let panoramas = match &folders.panoramas {
             Some(path) if pack::is_packed(path) => packed(path)?.panoramas()?,
-            Some(folder) => read_all(folder, &PANORAMAS, |path| {
-                Panorama::read(path).map_err(SynthError::Image)
-            })?,
+            Some(folder) => read_panoramas(folder)?,
             None => made_panoramas()?,
         };
-        let mut pictures: Vec<TextureImage> =
-            textures.into_iter().map(|(_, picture)| picture).collect();
-        pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
+        let panoramas = Panoramas::new(panoramas);
         let library = Self {
             meshes,
-            pictures,
-            panoramas: Panoramas::new(panoramas),
+            pictures: pictures_of(&panoramas),
+            panoramas,
             left_out,
             is_for_validation,
         };
@@ -114,12 +104,11 @@ impl Library {
     /// [`SynthError::Unusable`] if it is damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
         let packed = PackedLibrary::from_bytes(path, bytes)?;
-        let panoramas = packed.panoramas()?;
-        let pictures = panoramas.iter();
+        let panoramas = Panoramas::new(packed.panoramas()?);
         Ok(Self {
-            pictures: pictures.map(|(_, panorama)| picture_of(panorama)).collect(),
+            pictures: pictures_of(&panoramas),
             meshes: packed.meshes()?,
-            panoramas: Panoramas::new(panoramas),
+            panoramas,
             left_out: Vec::new(),
             is_for_validation: packed.is_for_validation().collect(),
         })
@@ -145,15 +134,8 @@ impl Library {
         let marks = &self.is_for_validation;
         let belongs = |name: &str| marks.get(name).is_none_or(|&own| own == is_validation);
         self.meshes.retain(|(name, _)| belongs(name));
-        let textures = self.pictures.len().saturating_sub(self.panoramas.len());
-        let mut number = 0;
-        self.pictures.retain(|_| {
-            number += 1;
-            let panorama = (number - 1_usize).checked_sub(textures);
-            let name = panorama.and_then(|panorama| self.panoramas.name(panorama));
-            name.is_none_or(belongs)
-        });
         self.panoramas.retain(belongs);
+        self.pictures = pictures_of(&self.panoramas);
         self.checked("this part of the library has no panorama: give another library, or a folder of panoramas")
     }
 
@@ -204,6 +186,13 @@ pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, SynthError> {
     Ok(made)
 }
 
+/// The panoramas as pictures to lay onto objects.
+fn pictures_of(panoramas: &Panoramas) -> Vec<TextureImage> {
+    let numbers = 0..panoramas.len();
+    let panoramas = numbers.filter_map(|number| panoramas.get(number));
+    panoramas.map(picture_of).collect()
+}
+
 /// A panorama as a picture: its light up to what one pixel in ten exceeds.
 fn picture_of(panorama: &Panorama) -> TextureImage {
     let small = panorama.resized(PICTURE_EXTENT);
@@ -233,12 +222,6 @@ const OTHER_MESHES: FileKind = FileKind {
     what: "other meshes",
     extensions: &[
         "3ds", "3mf", "blend", "dae", "fbx", "ply", "stl", "usd", "usda", "usdc", "usdz",
-    ],
-};
-const TEXTURES: FileKind = FileKind {
-    what: "textures",
-    extensions: &[
-        "png", "jpg", "jpeg", "jpe", "jfif", "webp", "tif", "tiff", "bmp",
     ],
 };
 pub(crate) const PANORAMAS: FileKind = FileKind {
@@ -327,21 +310,17 @@ impl FileKind {
     }
 }
 
-/// Every file of the wanted kind in a folder, by name.
-fn read_all<T>(
-    folder: &Path,
-    wanted: &FileKind,
-    read: impl Fn(&Path) -> Result<T, SynthError>,
-) -> Result<Vec<(String, T)>, SynthError> {
+/// Every panorama of a folder, by name.
+fn read_panoramas(folder: &Path) -> Result<Vec<(String, Panorama)>, SynthError> {
     let mut paths = members(folder)?;
-    paths.retain(|path| wanted.includes(path));
+    paths.retain(|path| PANORAMAS.includes(path));
     paths.sort();
     if paths.is_empty() {
-        return Err(wanted.missing(folder));
+        return Err(PANORAMAS.missing(folder));
     }
     let named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
-        Ok((name.to_string_lossy().into_owned(), read(path)?))
+        Ok((name.to_string_lossy().into_owned(), Panorama::read(path)?))
     };
     paths.iter().map(named).collect()
 }
