@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use image::Rgb;
 use image::codecs::hdr::HdrEncoder;
-use relight_core::image::{Extent, Planes};
+use relight_core::image::Extent;
 use relight_core::light::Panorama;
 
 use super::candidates::Candidate;
@@ -98,8 +98,11 @@ fn rounded(pixel: [f32; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use std::path::Path;
+
+    use relight_core::image::Planes;
+
+    use super::*;
 
     #[test]
     fn bright_and_dark_radiance_keeps_its_ratio() {
