@@ -1,12 +1,11 @@
 // The page: starts the engine and brings its parts together.
 
 import { $, make } from "./dom.js";
-import { Backgrounds } from "./backgrounds.js";
+import { Backgrounds, BUNDLED } from "./backgrounds.js";
 import { bindControls } from "./controls.js";
 import { Cutter } from "./cutter.js";
 import { Engine, MODULE, NETWORKS } from "./engine.js";
 import * as fields from "./fields.js";
-import { isZip } from "./files.js";
 import { Lamp } from "./lamp.js";
 import { Library } from "./library.js";
 import { Loading, sayFault } from "./loading.js";
@@ -24,8 +23,6 @@ import { Work } from "./work.js";
 
 /** Requests that take longer show activity, milliseconds. */
 const LONG = 300;
-/** The first background. */
-const FIRST = "room";
 
 notices.listen();
 fields.listen();
@@ -37,10 +34,14 @@ begin().catch((error) => {
 });
 
 async function begin() {
-  const engine = await Engine.start(new Loading(MODULE, NETWORKS));
+  const loading = new Loading(MODULE, ...Object.keys(BUNDLED), NETWORKS);
+  const engine = await Engine.start(loading);
   const library = new Library(engine);
-  const bundled = await library.bundled();
-  const work = new Work(emptyScene((bundled.find(({ key }) => key === FIRST) ?? bundled[0]).key));
+  for (const [file, name] of Object.entries(BUNDLED)) {
+    await loading.file("The scenes", file, (blob) => library.openBackground(new File([blob], file), "panorama_file", name));
+  }
+  const [first] = library.backgrounds.keys();
+  const work = new Work(emptyScene(first));
   const rendering = new Rendering(library, work, painterOn($("picture")), $("picture"));
   const cutter = new Cutter(library);
   const objects = new Objects(work, library, cutter, rendering);
@@ -48,11 +49,11 @@ async function begin() {
   new Stage(work, rendering);
   new Lamp(work, rendering);
   new Video(work, library);
-  const saving = new Saving(work, library);
+  new Saving(work, library);
   bindControls(work);
   bindSteps(work, cutter);
   bindBefore(rendering);
-  takeObjects(objects, saving);
+  for (const field of ["photo-file", "camera-file"]) fields.takeFiles(field, (file) => objects.add(file));
   showState(engine, rendering);
   rendering.refresh();
   document.body.classList.remove("starting");
@@ -107,12 +108,6 @@ function bindBefore(rendering) {
   button.addEventListener("click", (event) => {
     if (event.detail === 0) show(button.getAttribute("aria-pressed") !== "true");
   });
-}
-
-/** A file may be a photograph, a captured object or a saved scene. */
-function takeObjects(objects, saving) {
-  const take = async (file) => ((await isZip(file)) ? saving.reopen(file) : objects.add(file));
-  for (const field of ["photo-file", "camera-file"]) fields.takeFiles(field, take);
 }
 
 /** The engine's activity, and its notes on the picture. */

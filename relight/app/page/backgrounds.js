@@ -5,6 +5,9 @@ import { copyOf } from "./files.js";
 import { takeFiles } from "./fields.js";
 import { calm, say } from "./notices.js";
 
+/** The bundled panoramas by their files. */
+export const BUNDLED = { "room.hdr": "Room with a window", "studio.hdr": "Studio", "noon.hdr": "Noon", "evening.hdr": "Evening sun" };
+
 export class Backgrounds {
   #work;
   #library;

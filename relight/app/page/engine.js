@@ -11,7 +11,7 @@ export const MODULE = "relight.wasm";
 export const NETWORKS = "weights.safetensors";
 
 /** Requests after which the networks will be needed. */
-const NEED_NETWORKS = new Set(["open_photo", "open_pixels", "import"]);
+const NEED_NETWORKS = new Set(["open_photo", "open_pixels"]);
 
 /** The engine crashed during a request. */
 export class Fault extends Error {}

@@ -22,11 +22,6 @@ export async function openable(file) {
   return READ_BY_ENGINE.some(([at, text]) => head.startsWith(text, at));
 }
 
-/** Whether a file is a zip that may be a saved scene: a captured object is a zip of another kind. */
-export async function isZip(file) {
-  return !isCaptured(file) && (await headOf(file)).startsWith("PK\x03\x04");
-}
-
 /** A picture decoded by the browser, upright and not too large: { fields: { name, width, height }, rgba }. */
 export async function asPixels(file) {
   const [wide, high] = declaredSize(await headOf(file)) ?? [0, 0];

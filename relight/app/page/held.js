@@ -6,7 +6,6 @@ const KEYS = {
   open_pixels: ({ object }) => `object ${object}`,
   mask: ({ object }) => `mask ${object}`,
   background: () => "background",
-  import: () => "import",
 };
 
 export class Held {
@@ -15,7 +14,6 @@ export class Held {
   /** Keeps an answered request, if it changed the engine's contents. */
   note(request) {
     const { op, object } = request.fields;
-    if (op === "import") this.#requests.clear();
     if (op === "close") {
       this.#requests.delete(`object ${object}`);
       this.#requests.delete(`mask ${object}`);

@@ -68,29 +68,19 @@ export class Library {
     }
   }
 
-  /** The engine's own backgrounds. */
-  async bundled() {
-    const { panoramas, parts } = await this.#engine.ask("backgrounds");
-    panoramas.forEach(({ id, name }, index) => {
-      const small = canvasOf(parts[index], 96, 48);
-      this.#addBackground({ key: id, name, kind: "panorama", fields: { kind: "panorama", id }, parts: [], small });
-    });
-    return panoramas.map(({ id }) => this.backgrounds.get(id));
-  }
-
-  /** Opens a file as a background: "photo" or "panorama_file". */
-  async openBackground(file, kind) {
+  /** Opens a file as a background, "photo" or "panorama_file", by a name for people. */
+  async openBackground(file, kind, name = file.name) {
     let [fields, parts] = [{ kind, name: file.name }, [file]];
-    const key = `own ${++this.#number}`;
+    const key = `background ${++this.#number}`;
     const answer = await this.#inTurn(async () => {
       const opened = await this.#ask(file, (_, bytes) => this.#engine.ask("background", { kind, name: file.name }, (parts = bytes)),
         (read, bytes) => this.#engine.ask("background", (fields = { kind: pixelKind(kind), ...read }), (parts = bytes)));
       this.#background = key;
       return opened;
     });
-    const background = { key, name: file.name, kind, fields, parts, width: answer.width, height: answer.height };
-    background.small = await smallOfFile(file);
-    this.#addBackground(background);
+    const { width, height } = answer;
+    const background = { key, name, kind, fields, parts, width, height, small: canvasOf(answer.parts[0], 96, 48) };
+    this.backgrounds.set(key, background);
     return background;
   }
 
@@ -111,38 +101,6 @@ export class Library {
     const done = this.#asked.then(work);
     this.#asked = done.catch(() => {});
     return done;
-  }
-
-  /** Opens a saved scene in place of everything: its scene, and the key of its background. */
-  reopen(file) {
-    return this.#inTurn(async () => {
-      const answer = await this.#engine.ask("import", {}, [file]);
-      return { scene: answer.scene, background: this.#takeImport(answer) };
-    });
-  }
-
-  #takeImport({ objects, background, parts }) {
-    const rest = [...parts];
-    this.photos.clear();
-    for (const { object, ...about } of objects) {
-      this.#number = Math.max(this.#number, object);
-      const photo = { ...about, object, sketch: null, layers: null };
-      this.#take(photo, rest.splice(0, about.masked ? 2 : 1));
-    }
-    return this.#takeBackground(background, rest[0]);
-  }
-
-  /** The background of a saved scene: one of the engine's own, or that of the file, which only the engine has. */
-  #takeBackground({ kind, name, id, width, height }, thumbnail) {
-    const known = id !== undefined && this.backgrounds.get(id);
-    const key = known ? id : `own ${++this.#number}`;
-    if (!known) this.#addBackground({ key, name, kind, width, height, small: canvasOf(thumbnail, ...sidesOf(thumbnail, width, height)) });
-    this.#background = key;
-    return key;
-  }
-
-  #addBackground(background) {
-    this.backgrounds.set(background.key, background);
   }
 
   #take(photo, [picture, mask]) {
@@ -214,25 +172,6 @@ function maskCanvas({ mask, width, height }) {
   const canvas = new OffscreenCanvas(width, height);
   canvas.getContext("2d").putImageData(new ImageData(rgba, width, height), 0, 0);
   return canvas;
-}
-
-/** A small picture of a background's file; a grey one if the browser cannot read it. */
-async function smallOfFile(file) {
-  const small = new OffscreenCanvas(96, 48);
-  const context = small.getContext("2d");
-  context.fillStyle = "#888";
-  context.fillRect(0, 0, 96, 48);
-  const image = await createImageBitmap(file, { resizeWidth: 96, resizeHeight: 48 }).catch(() => null);
-  if (image) context.drawImage(image, 0, 0);
-  return small;
-}
-
-/** The sides of a thumbnail from its number of pixels. */
-function sidesOf(rgba, width, height) {
-  const pixels = rgba.length / 4;
-  if (pixels === 96 * 48) return [96, 48];
-  const across = Math.round(Math.sqrt((pixels * width) / height));
-  return [across, Math.floor(pixels / across)];
 }
 
 const pixelKind = (kind) => (kind === "photo" ? "photo_pixels" : kind);

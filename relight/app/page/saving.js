@@ -1,10 +1,8 @@
 // Saves pictures and scenes as downloads or through the browser's share sheet.
 
 import { $ } from "./dom.js";
-import { takeFiles } from "./fields.js";
-import { copyOf, isZip } from "./files.js";
 import { attempt, calm, say } from "./notices.js";
-import { forEngine, fromEngine } from "./scene.js";
+import { forEngine } from "./scene.js";
 
 const TYPES = { png: "image/png", jpeg: "image/jpeg" };
 const ENDS = { png: "png", jpeg: "jpg" };
@@ -18,7 +16,6 @@ export class Saving {
     for (const format of ["png", "jpeg"]) $(`save-${format}`).addEventListener("click", () => attempt(() => this.#save(format)));
     $("share").addEventListener("click", () => attempt(() => this.#share()));
     $("keep").addEventListener("click", () => attempt(() => this.#keep()));
-    takeFiles("reopen-file", (file) => this.reopen(file));
     window.addEventListener("beforeunload", (event) => {
       if (work.unsaved) event.preventDefault();
     });
@@ -59,17 +56,6 @@ export class Saving {
     download(new File(parts, "relight-scene.zip", { type: "application/zip" }));
     this.#work.kept(scene);
     say("The scene is saved, with its photographs.");
-  }
-
-  /** Opens a saved scene in place of this one. */
-  async reopen(file) {
-    calm();
-    if (!(await isZip(file))) throw new Error(`${file.name} is not a saved scene: choose a zip file that this page saved.`);
-    if (this.#work.unsaved && !confirm("Open another scene? This one is not saved.")) return;
-    say(`Opening ${file.name} …`);
-    const { scene, background } = await this.#library.reopen(await copyOf(file));
-    this.#work.begin(fromEngine(scene, background));
-    say("The scene is open.");
   }
 
   /** The scene, which has an object. */

@@ -1,8 +1,8 @@
 // The scene: objects, their places and the light. Plain values; every change makes a new scene.
 
 export const MOST_OBJECTS = 12;
-/** The engine's fields of a scene, without those of its objects. */
-const FIELDS = ["size", "fov", "down", "tilt", "match", "white_balance", "exposure", "light"];
+/** The engine's fields of a scene, without its light and those of its objects. */
+const FIELDS = ["size", "fov", "down", "tilt", "match", "white_balance", "exposure"];
 const OBJECT_FIELDS = ["object", "at", "height", "rotation", "tint", "gloss", "exposure", "shadow"];
 const LIGHT = { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 0 };
 /** The offset of a copy from its original, in parts of the picture. */
@@ -21,12 +21,11 @@ export function newObject(object, place) {
 
 /** The scene as the engine takes it. */
 export function forEngine(scene) {
-  return { ...pick(scene, FIELDS), objects: scene.objects.map((object) => pick(object, OBJECT_FIELDS)) };
+  return { ...pick(scene, FIELDS), light: lightForEngine(scene.light), objects: scene.objects.map((object) => pick(object, OBJECT_FIELDS)) };
 }
 
-/** A scene of the engine, with the background that the page knows under a key. */
-export function fromEngine(scene, background) {
-  return { ...emptyScene(background), ...pick(scene, FIELDS), light: { ...LIGHT, ...scene.light }, objects: scene.objects.map(({ object, ...place }) => newObject(object, place)) };
+function lightForEngine({ kind, azimuth, elevation, colour, size, ambient, angle }) {
+  return kind === "lamp" ? { lamp: [azimuth, elevation, colour, size].join(), ambient, angle } : { angle };
 }
 
 export function added(scene, object) {

@@ -12,15 +12,8 @@ export class Work extends EventTarget {
 
   constructor(scene) {
     super();
-    this.begin(scene);
-  }
-
-  /** Starts over with a scene, without a history. */
-  begin(scene) {
     this.#history = new History(scene);
     this.#kept = scene;
-    this.selected = scene.objects.at(-1)?.key ?? null;
-    this.#tell();
   }
 
   get scene() {

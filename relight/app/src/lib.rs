@@ -4,7 +4,6 @@
 //! | --- | --- |
 //! | `message` | requests and replies as bytes: several parts, the first of them JSON |
 //! | `studio` | the engine: photographs, masks, scenes and what is asked of them |
-//! | `scenery` | panoramas that are made, so that a scene needs no file |
 //! | `browser` | the engine's functions that the page's worker calls |
 #![cfg_attr(feature = "server", doc = "| [`server`] | serves the page |")]
 //!
@@ -14,15 +13,13 @@
 //! use relight_app::{Studio, pack, unpack};
 //!
 //! let mut studio = Studio::new();
-//! let reply = studio.answer(&pack(&[br#"{"op": "backgrounds"}"#]));
-//! let parts = unpack(&reply).unwrap();
-//! assert!(std::str::from_utf8(parts[0]).unwrap().contains("panoramas"));
+//! let reply = studio.answer(&pack(&[br#"{"op": "close", "object": 1}"#]));
+//! assert_eq!(unpack(&reply).unwrap(), [b"{}"]);
 //! ```
 
 #[cfg(target_arch = "wasm32")]
 mod browser;
 mod message;
-mod procedural_panorama;
 #[cfg(feature = "server")]
 pub mod server;
 mod studio;

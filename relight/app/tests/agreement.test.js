@@ -91,7 +91,7 @@ async function agreeOnLayers(t, object, path, maskPath, mask) {
 }
 
 async function agreeOnPicture(t, object, folder) {
-  await ask(page, "background", { kind: "panorama", id: "room" });
+  await ask(page, "background", { kind: "panorama_file", name: "room.hdr" }, [await readFile(join(FOLDER, "room.hdr"))]);
   const scene = sceneOf(object);
   const [png] = (await ask(page, "save", { scene, format: "png" })).parts;
   const [zip] = (await ask(page, "export", { scene, name: "scene" })).parts;
@@ -104,7 +104,7 @@ async function agreeOnPicture(t, object, folder) {
 
 const sceneOf = (object) => ({
   size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0,
-  light: { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 40 },
+  light: { angle: 40 },
   objects: [{ object, at: [0.55, 0.92], height: 0.5, rotation: 5, tint: [1, 0.9, 0.8], gloss: [0.3, 60], exposure: 0.2, shadow: 0.9 }],
 });
 

@@ -2,6 +2,7 @@
 
 import { readFile } from "node:fs/promises";
 import { cpus } from "node:os";
+import { join } from "node:path";
 
 import { launch, offline, open, settled } from "./browser.js";
 import { BALL, ball } from "./photos.js";
@@ -65,7 +66,7 @@ async function asked() {
   await ask(page, "mask", { object: 2, rect: BALL.map((part) => Math.round(256 * part)), strokes: [] });
   tell("first decomposition at 256", ms(1000 * (await ask(page, "decompose", { object: 2 })).seconds), "<= 1200 ms");
 
-  await ask(page, "background", { kind: "panorama", id: "room" });
+  await ask(page, "background", { kind: "panorama_file", name: "room.hdr" }, [await readFile(join(FOLDER, "room.hdr"))]);
   for (const kind of ["background", "lamp"]) {
     const times = await page.evaluate(turned, { scene: sceneOf(kind), frames: FRAMES });
     tell(`turning the light (${kind}), layers at 512: median, p95`, `${ms(at(times, 0.5))}, ${ms(at(times, 0.95))}`, "<= 33 ms");
@@ -151,7 +152,7 @@ async function residentOf(id) {
 function sceneOf(kind) {
   return {
     size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0,
-    light: { kind, azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 0 },
+    light: { angle: 0, ...(kind === "lamp" ? { lamp: "45,45,#ffffff,30", ambient: 0.15 } : {}) },
     objects: [{ object: 1, at: [0.5, 0.9], height: 0.5, rotation: 0, tint: [1, 1, 1], gloss: null, exposure: 0, shadow: 1 }],
   };
 }

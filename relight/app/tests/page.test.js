@@ -73,7 +73,7 @@ for (const size of Object.keys(SIZES)) {
     await addSecond(page);
     await makeGlossy(page, size);
     await compareBefore(page);
-    await saveAndReopen(page, size);
+    await save(page, size);
 
     assert.deepEqual(problems, []);
     assert.deepEqual(requests, [], "nothing was asked after the page was loaded");
@@ -204,7 +204,7 @@ async function compareBefore(page) {
   assert.equal(await steps.stagePicture(page), after, "let go, it is as it was");
 }
 
-async function saveAndReopen(page, size) {
+async function save(page, size) {
   await steps.tab(page, "save");
   await shot(page, `${size}-7-save`);
   const png = await steps.downloaded(page, "#save-png");
@@ -214,12 +214,7 @@ async function saveAndReopen(page, size) {
   assert.deepEqual([jpeg.name, jpeg.bytes.readUInt16BE(0)], ["relight.jpg", 0xffd8]);
 
   const zip = await steps.downloaded(page, "#keep");
-  await steps.choose(page, { name: zip.name, mimeType: "application/zip", buffer: zip.bytes }, "#reopen-file");
-  await page.waitForFunction(() => document.getElementById("status").textContent === "The scene is open.");
-  await settled(page);
-  const again = await steps.decoded(page, (await steps.downloaded(page, "#save-png")).bytes);
-  const far = steps.farthest(picture.rgba, again.rgba);
-  assert.ok(far <= 1, `the reopened scene's picture differs by ${far}`);
+  assert.deepEqual([zip.name, zip.bytes.readUInt16BE(0)], ["relight-scene.zip", 0x504b]);
 }
 
 /** The whole way, and no pointer. */

@@ -25,11 +25,10 @@ pub(crate) struct ObjectSources {
 }
 
 impl ObjectSources {
-    /// The folders, with one of pictures to lay onto objects.
-    pub(crate) fn folders(&self, textures: Option<PathBuf>) -> Folders {
+    /// The folders.
+    pub(crate) fn folders(&self) -> Folders {
         Folders {
             meshes: self.meshes.clone(),
-            textures,
             panoramas: self.panoramas.clone(),
         }
     }

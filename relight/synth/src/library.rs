@@ -1,4 +1,4 @@
-//! What a user brings: meshes, textures and panoramas, read once.
+//! What a user brings: meshes and panoramas, read once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
@@ -11,7 +11,7 @@ use super::SynthError;
 use super::lighting::Panoramas;
 use super::lighting::studio::Surroundings;
 use super::mesh::{Mesh, NOT_READ};
-use super::pack::{self, LibraryContents, LibraryFilter};
+use super::pack::{self, PackedLibrary};
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
@@ -30,7 +30,7 @@ const VARIANTS: u64 = 4;
 pub struct Library {
     /// By file name, with its folders; empty: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
-    /// Textures, and panoramas as textures.
+    /// The panoramas as textures.
     pub(crate) pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
@@ -60,8 +60,6 @@ impl fmt::Display for SkippedFile {
 pub struct Folders {
     /// `.obj`, `.gltf` and `.glb`, also in folders within it.
     pub meshes: Option<PathBuf>,
-    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB by default.
-    pub textures: Option<PathBuf>,
     /// `.hdr` and `.exr`; `None`: the synthetic ones.
     pub panoramas: Option<PathBuf>,
 }
@@ -73,32 +71,29 @@ impl Library {
     /// # Errors
     /// If a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
-        let packed = LibraryContents::from_folders(folders)?;
+        let mut is_for_validation = BTreeMap::new();
+        let mut packed = |path: &Path| {
+            let packed = PackedLibrary::read(path)?;
+            is_for_validation.extend(packed.is_for_validation());
+            Ok::<_, SynthError>(packed)
+        };
         let (meshes, left_out) = match &folders.meshes {
-            Some(path) if pack::is_packed(path) => (packed.meshes, Vec::new()),
+            Some(path) if pack::is_packed(path) => (packed(path)?.meshes()?, Vec::new()),
             Some(folder) => read_meshes(folder)?,
             None => (Vec::new(), Vec::new()),
         };
-        let textures = match &folders.textures {
-            Some(folder) => read_all(folder, &TEXTURES, TextureImage::read)?,
-            None => Vec::new(),
-        };
         let panoramas = match &folders.panoramas {
-            Some(path) if pack::is_packed(path) => packed.panoramas,
-            Some(folder) => read_all(folder, &PANORAMAS, |path| {
-                Panorama::read(path).map_err(SynthError::Image)
-            })?,
+            Some(path) if pack::is_packed(path) => packed(path)?.panoramas()?,
+            Some(folder) => read_panoramas(folder)?,
             None => made_panoramas()?,
         };
-        let mut pictures: Vec<TextureImage> =
-            textures.into_iter().map(|(_, picture)| picture).collect();
-        pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
+        let panoramas = Panoramas::new(panoramas);
         let library = Self {
             meshes,
-            pictures,
-            panoramas: Panoramas::new(panoramas),
+            pictures: pictures_of(&panoramas),
+            panoramas,
             left_out,
-            is_for_validation: packed.is_for_validation,
+            is_for_validation,
         };
         library.checked("all panoramas are black: give one with light")
     }
@@ -108,14 +103,14 @@ impl Library {
     /// # Errors
     /// [`SynthError::Unusable`] if it is damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
-        let contents = pack::read(path, bytes, LibraryFilter::ALL)?;
-        let pictures = contents.panoramas.iter();
+        let packed = PackedLibrary::from_bytes(path, bytes)?;
+        let panoramas = Panoramas::new(packed.panoramas()?);
         Ok(Self {
-            pictures: pictures.map(|(_, panorama)| picture_of(panorama)).collect(),
-            meshes: contents.meshes,
-            panoramas: Panoramas::new(contents.panoramas),
+            pictures: pictures_of(&panoramas),
+            meshes: packed.meshes()?,
+            panoramas,
             left_out: Vec::new(),
-            is_for_validation: contents.is_for_validation,
+            is_for_validation: packed.is_for_validation().collect(),
         })
     }
 
@@ -139,15 +134,8 @@ impl Library {
         let marks = &self.is_for_validation;
         let belongs = |name: &str| marks.get(name).is_none_or(|&own| own == is_validation);
         self.meshes.retain(|(name, _)| belongs(name));
-        let textures = self.pictures.len().saturating_sub(self.panoramas.len());
-        let mut number = 0;
-        self.pictures.retain(|_| {
-            number += 1;
-            let panorama = (number - 1_usize).checked_sub(textures);
-            let name = panorama.and_then(|panorama| self.panoramas.name(panorama));
-            name.is_none_or(belongs)
-        });
         self.panoramas.retain(belongs);
+        self.pictures = pictures_of(&self.panoramas);
         self.checked("this part of the library has no panorama: give another library, or a folder of panoramas")
     }
 
@@ -176,32 +164,6 @@ impl Library {
     }
 }
 
-impl LibraryContents {
-    /// The wanted part of packed libraries given in place of folders; each is read once.
-    fn from_folders(folders: &Folders) -> Result<Self, SynthError> {
-        let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
-        let (meshes, panoramas) = (packed(&folders.meshes), packed(&folders.panoramas));
-        let mut contents = Self::default();
-        let paths: BTreeSet<&PathBuf> = meshes.iter().chain(&panoramas).collect();
-        for path in paths {
-            let bytes = fs::read(path).map_err(SynthError::read(path))?;
-            let wanted = LibraryFilter {
-                meshes: meshes.as_ref() == Some(path),
-                panoramas: panoramas.as_ref() == Some(path),
-            };
-            let read = pack::read(path, &bytes, wanted)?;
-            if wanted.meshes {
-                contents.meshes = read.meshes;
-            }
-            if wanted.panoramas {
-                contents.panoramas = read.panoramas;
-            }
-            contents.is_for_validation.extend(read.is_for_validation);
-        }
-        Ok(contents)
-    }
-}
-
 /// The synthetic panoramas, by name: four each of studio, room and sky, and one even light.
 ///
 /// # Errors
@@ -222,6 +184,13 @@ pub fn made_panoramas() -> Result<Vec<(String, Panorama)>, SynthError> {
         }
     }
     Ok(made)
+}
+
+/// The panoramas as pictures to lay onto objects.
+fn pictures_of(panoramas: &Panoramas) -> Vec<TextureImage> {
+    let numbers = 0..panoramas.len();
+    let panoramas = numbers.filter_map(|number| panoramas.get(number));
+    panoramas.map(picture_of).collect()
 }
 
 /// A panorama as a picture: its light up to what one pixel in ten exceeds.
@@ -253,12 +222,6 @@ const OTHER_MESHES: FileKind = FileKind {
     what: "other meshes",
     extensions: &[
         "3ds", "3mf", "blend", "dae", "fbx", "ply", "stl", "usd", "usda", "usdc", "usdz",
-    ],
-};
-const TEXTURES: FileKind = FileKind {
-    what: "textures",
-    extensions: &[
-        "png", "jpg", "jpeg", "jpe", "jfif", "webp", "tif", "tiff", "bmp",
     ],
 };
 pub(crate) const PANORAMAS: FileKind = FileKind {
@@ -347,21 +310,17 @@ impl FileKind {
     }
 }
 
-/// Every file of the wanted kind in a folder, by name.
-fn read_all<T>(
-    folder: &Path,
-    wanted: &FileKind,
-    read: impl Fn(&Path) -> Result<T, SynthError>,
-) -> Result<Vec<(String, T)>, SynthError> {
+/// Every panorama of a folder, by name.
+fn read_panoramas(folder: &Path) -> Result<Vec<(String, Panorama)>, SynthError> {
     let mut paths = members(folder)?;
-    paths.retain(|path| wanted.includes(path));
+    paths.retain(|path| PANORAMAS.includes(path));
     paths.sort();
     if paths.is_empty() {
-        return Err(wanted.missing(folder));
+        return Err(PANORAMAS.missing(folder));
     }
     let named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
-        Ok((name.to_string_lossy().into_owned(), read(path)?))
+        Ok((name.to_string_lossy().into_owned(), Panorama::read(path)?))
     };
     paths.iter().map(named).collect()
 }

@@ -1,15 +1,13 @@
 //! Pictures that are laid onto objects.
 
 use std::io::Cursor;
-use std::path::Path;
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageError as FileError, ImageReader, Limits, RgbImage};
 
-use super::SynthError;
-use relight_core::image::{ColourImage, ColourSpace, Extent, Linear, Srgb};
+use relight_core::image::{ColourSpace, Linear, Srgb};
 
 /// Longest side of a mesh's own pictures in memory: larger ones are reduced.
 const MAX_SIDE: usize = 1024;
@@ -36,7 +34,7 @@ enum Texels {
 }
 
 /// What the values of a mesh's picture are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum PictureKind {
     /// sRGB.
     Colours,
@@ -98,19 +96,6 @@ impl TextureImage {
             mean: sum / count.max(1) as f32,
             transparent_fraction: 0.0,
         }
-    }
-
-    /// Reads a picture, whose values are sRGB by default.
-    ///
-    /// # Errors
-    /// [`SynthError::Image`] if it cannot be read or is not a picture.
-    pub(crate) fn read(path: &Path) -> Result<Self, SynthError> {
-        let image = ColourImage::read(path, None)?.into_light();
-        let planes = image.planes();
-        let Extent { width, height } = planes.extent();
-        Ok(Self::from_fn(width, height, |x, y| {
-            Vec3::from_array(planes.pixel(x, y))
-        }))
     }
 
     /// A picture of a mesh's own, PNG, JPEG or WebP. That of colours is sRGB: glTF has readers leave out what a file says

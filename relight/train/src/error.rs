@@ -18,9 +18,6 @@ pub enum TrainError {
     /// A data set cannot be opened.
     #[error(transparent)]
     Data(#[from] relight_core::reader::ReadError),
-    /// A sheet of predictions could not be encoded.
-    #[error(transparent)]
-    Encode(#[from] relit_data::shard::ShardError),
     /// A fault, and what to do: in something given (a setting, an option, a checkpoint or a GPU), or in the
     /// run itself.
     #[error("{0}")]

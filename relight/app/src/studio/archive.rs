@@ -2,26 +2,21 @@
 //! the background. Entries are stored without compression.
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Read, Write};
-use std::path::{Path, PathBuf};
+use std::io::{Cursor, Write};
+use std::path::PathBuf;
 
 use relight_photo::compositing::SceneDescription;
-use relit_data::text;
 use relit_grabcut::grey_png;
-use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipArchive, ZipWriter};
+use zip::{CompressionMethod, ZipWriter};
 
 use super::background::StudioBackground;
-use super::error::{StudioError, refused};
+use super::error::StudioError;
 use super::object::{StudioObject, stem};
 use super::page_scene::ObjectFiles;
 
 /// The description's entry.
 const SCENE: &str = "scene.toml";
-/// The most that an archive unpacks to, bytes.
-const MAX_BYTES: u64 = 256_000_000;
-const TOO_LARGE: &str = "the archive is too large: it holds more than 256 MB";
 
 /// The files of a scene by their names in an archive.
 #[derive(Default)]
@@ -46,19 +41,13 @@ impl SceneFiles {
         Ok(ObjectFiles {
             photo: photo.into(),
             mask: mask.map(PathBuf::from),
-            transfer: object.transfer,
         })
     }
 
     /// Adds the background's file; its name.
-    ///
-    /// # Errors
-    /// If it cannot be encoded.
-    pub(super) fn add_background(
-        &mut self,
-        background: &StudioBackground,
-    ) -> Result<PathBuf, StudioError> {
-        Ok(self.add(&background.name, background.file()?).into())
+    pub(super) fn add_background(&mut self, background: &StudioBackground) -> PathBuf {
+        self.add(&background.name, background.file().to_vec())
+            .into()
     }
 
     /// Adds a file under a unique name; files with the same content become one.
@@ -99,73 +88,6 @@ impl SceneFiles {
         }
         Ok(archive.finish()?.into_inner())
     }
-
-    /// The scene and the files of an archive.
-    ///
-    /// # Errors
-    /// If it is not an archive, is too large, or its scene names a file that it does not contain.
-    pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), StudioError> {
-        let mut archive = ZipArchive::new(Cursor::new(archive)).map_err(|fault| damaged(&fault))?;
-        let text = text::decode(entry(&mut archive, SCENE)?);
-        let text = text.map_err(|_| StudioError("scene.toml is not UTF-8".to_owned()))?;
-        let scene = SceneDescription::parse(&text)?;
-        let mut files = Self::default();
-        let mut all = 0;
-        for path in scene.files() {
-            let name = path.to_string_lossy().into_owned();
-            if files.entries.contains_key(&name) {
-                continue;
-            }
-            let content = entry(&mut archive, &name)?;
-            all += content.len() as u64;
-            if all > MAX_BYTES {
-                return refused(TOO_LARGE);
-            }
-            files.entries.insert(name, content);
-        }
-        Ok((scene, files))
-    }
-
-    /// The content of a file.
-    ///
-    /// # Errors
-    /// If the archive lacks it.
-    pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, StudioError> {
-        let name = path.to_string_lossy();
-        let content = self.entries.get(name.as_ref());
-        content.ok_or_else(|| missing(&name))
-    }
-}
-
-fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>, StudioError> {
-    let found = match archive.by_name(name) {
-        Ok(found) => found,
-        Err(ZipError::FileNotFound) => return Err(missing(name)),
-        Err(fault) => return Err(damaged(&fault)),
-    };
-    let mut content = Vec::new();
-    found
-        .take(MAX_BYTES + 1)
-        .read_to_end(&mut content)
-        .map_err(|fault| damaged(&fault))?;
-    if content.len() as u64 > MAX_BYTES {
-        refused(TOO_LARGE)
-    } else {
-        Ok(content)
-    }
-}
-
-fn missing(name: &str) -> StudioError {
-    StudioError(format!(
-        "the archive lacks {name}, which its scene.toml names"
-    ))
-}
-
-fn damaged(fault: &(dyn std::error::Error + 'static)) -> StudioError {
-    StudioError::with_cause(
-        "this file is not a saved scene: it is not a ZIP archive, or is damaged",
-        fault,
-    )
 }
 
 /// A name that is one on every system, and leads nowhere else.
@@ -191,26 +113,5 @@ mod tests {
         assert_eq!(files.add("a b.png", vec![1]), "a-b.png");
         assert_eq!(files.add("scene.toml", vec![1]), "scene-2.toml");
         assert_eq!(files.add("..", vec![3]), ".bin");
-    }
-
-    #[test]
-    fn what_is_packed_is_unpacked_and_what_is_missing_is_named() {
-        let mut files = SceneFiles::default();
-        files.add("a.png", vec![7; 20]);
-        let scene = |photo: &str| {
-            let text = format!("background = \"a.png\"\n[[object]]\nphoto = \"{photo}\"");
-            SceneDescription::parse(&text).unwrap()
-        };
-        let archive = files.packed(&scene("a.png")).unwrap();
-        let (back, unpacked) = SceneFiles::unpacked(&archive).unwrap();
-        assert_eq!(back, scene("a.png"));
-        assert_eq!(unpacked.content(Path::new("a.png")).unwrap(), &vec![7; 20]);
-        let lacking = files.packed(&scene("b.png")).unwrap();
-        let fault = SceneFiles::unpacked(&lacking).err().unwrap().0;
-        assert!(fault.contains("b.png"), "{fault}");
-        assert!(SceneFiles::unpacked(b"no archive").is_err());
-        for length in (0..archive.len()).step_by(7) {
-            assert!(SceneFiles::unpacked(&archive[..length]).is_err());
-        }
     }
 }

@@ -8,13 +8,11 @@ use relight_photo::compositing::{SceneBackground, SceneDescription, SceneEnviron
 use relight_photo::decompose::UsableImage;
 use relight_photo::relighting::PanoramaView;
 use relit_data::statistics::upper_median;
-use relit_data::still::Format;
 
 use super::error::{StudioError, refused};
 use super::object::{OpenedFile, png_of, stem};
 use super::pixels::rgba;
 use super::request::BackgroundRequest;
-use crate::procedural_panorama::ProceduralPanorama;
 
 /// The most columns of a panorama.
 const MAX_COLUMNS: usize = 1024;
@@ -43,9 +41,7 @@ struct PhotoBackground {
 }
 
 struct PanoramaBackground {
-    /// `None` for a synthetic one.
-    file: Option<Vec<u8>>,
-    scenery: Option<ProceduralPanorama>,
+    file: Vec<u8>,
     panorama: Panorama,
     /// The last camera, and what it depends on.
     view: Option<(ViewKey, PanoramaView)>,
@@ -60,11 +56,6 @@ impl StudioBackground {
     /// If it cannot be read, or is not a panorama.
     pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, StudioError> {
         match asked {
-            BackgroundRequest::Panorama { id } => {
-                let scenery = ProceduralPanorama::from_id(id);
-                let none = || StudioError(format!("unknown panorama {id}"));
-                Ok(Self::made(scenery.ok_or_else(none)?)?)
-            }
             BackgroundRequest::Photo { name } => Self::photo(name, bytes.to_vec()),
             BackgroundRequest::PhotoPixels {
                 name,
@@ -78,24 +69,12 @@ impl StudioBackground {
         }
     }
 
-    fn made(scenery: ProceduralPanorama) -> Result<Self, relight_core::light::LightError> {
-        Ok(Self {
-            name: format!("{}.exr", scenery.id),
-            content: Content::Panorama(PanoramaBackground {
-                file: None,
-                scenery: Some(scenery),
-                panorama: scenery.panorama()?,
-                view: None,
-            }),
-        })
-    }
-
     /// A photograph.
     ///
     /// # Errors
     /// If it cannot be read.
-    pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
-        let opened = OpenedFile::read(name, bytes, None)?;
+    fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let opened = OpenedFile::read(name, bytes)?;
         let (name, file) = (opened.name, opened.bytes);
         let picture = UsableImage::new(opened.image).image.into_light();
         Ok(Self {
@@ -112,8 +91,8 @@ impl StudioBackground {
     ///
     /// # Errors
     /// If it cannot be read or has another shape.
-    pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
-        let opened = OpenedFile::read(name, bytes, None)?;
+    fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let opened = OpenedFile::read(name, bytes)?;
         let Extent { width, height } = opened.image.stored().planes.extent();
         // Making it smaller rounds its sides.
         if width.abs_diff(2 * height) > 2 || height < 4 {
@@ -139,60 +118,18 @@ impl StudioBackground {
         Ok(Self {
             name,
             content: Content::Panorama(PanoramaBackground {
-                file: Some(file),
-                scenery: None,
+                file,
                 panorama,
                 view: None,
             }),
         })
     }
 
-    /// The synthetic panorama of this id, or that of a saved scene's file: a synthetic one is known by its name.
-    ///
-    /// # Errors
-    /// If it cannot be read.
-    pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
-        let made = ProceduralPanorama::ALL
-            .into_iter()
-            .find(|scenery| name == format!("{}.exr", scenery.id));
-        if let Some(scenery) = made {
-            let background = Self::made(scenery)?;
-            if background.file()? == bytes {
-                return Ok(background);
-            }
-        }
-        let is_radiance = matches!(Format::sniff(&bytes), Some(Format::Exr | Format::Radiance));
-        let is_wide = relight_photo::decompose::stated_extent(&bytes)
-            .is_some_and(|extent| extent.width == 2 * extent.height);
-        if is_radiance && is_wide {
-            Self::panorama(name, bytes)
-        } else {
-            Self::photo(name, bytes)
-        }
-    }
-
-    /// Whether it is a panorama, and the id of a synthetic one.
-    pub(super) fn panorama_id(&self) -> Option<Option<&'static str>> {
-        match &self.content {
-            Content::Photo(_) => None,
-            Content::Panorama(panorama) => Some(panorama.scenery.map(|scenery| scenery.id)),
-        }
-    }
-
     /// The file that is kept with a scene.
-    ///
-    /// # Errors
-    /// If a panorama that is made cannot be encoded.
-    pub(super) fn file(&self) -> Result<Vec<u8>, StudioError> {
+    pub(super) fn file(&self) -> &[u8] {
         match &self.content {
-            Content::Photo(photo) => Ok(photo.file.clone()),
-            Content::Panorama(PanoramaBackground {
-                file: Some(file), ..
-            }) => Ok(file.clone()),
-            Content::Panorama(panorama) => Ok(encode_exr(
-                Path::new(&self.name),
-                panorama.panorama.image().planes(),
-            )?),
+            Content::Photo(photo) => &photo.file,
+            Content::Panorama(panorama) => &panorama.file,
         }
     }
 
@@ -270,18 +207,6 @@ impl PhotoBackground {
             .as_ref()
             .map_or(&self.picture, |(_, downscaled)| downscaled)
     }
-}
-
-/// The panoramas that are made, each with a little picture.
-///
-/// # Errors
-/// None: their values are finite.
-pub(super) fn made_panoramas() -> Result<Vec<(ProceduralPanorama, Vec<u8>)>, StudioError> {
-    let made = |scenery: ProceduralPanorama| {
-        let panorama = scenery.panorama_of(THUMBNAIL)?;
-        Ok((scenery, thumbnail(&panorama)))
-    };
-    ProceduralPanorama::ALL.into_iter().map(made).collect()
 }
 
 /// A panorama exposed for a screen by its median, so that a sun does not make everything else black.

@@ -3,7 +3,7 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `request` | what the page asks |
-//! | `page_scene` | the page's scene, to and from the scene of a file |
+//! | `page_scene` | the page's scene as that of a file |
 //! | `object` | a photograph or captured object, cut out and decomposed |
 //! | `background` | what objects are put into |
 //! | `renderer` | pictures of a scene |
@@ -32,7 +32,7 @@ use serde_json::{Value, json};
 
 use crate::message::{pack, unpack};
 use archive::SceneFiles;
-use background::{StudioBackground, made_panoramas};
+use background::StudioBackground;
 use error::{StudioError, refused};
 use object::StudioObject;
 use page_scene::{ObjectFiles, PageScene};
@@ -136,10 +136,8 @@ impl Studio {
                 self.objects.0.remove(&object);
                 Ok((json!({}), Vec::new()))
             }
-            Request::Backgrounds => backgrounds(),
             Request::Background(asked) => {
-                let bytes = parts.get(1).copied().unwrap_or_default();
-                self.choose(StudioBackground::open(&asked, bytes)?)
+                self.choose(StudioBackground::open(&asked, part("file")?)?)
             }
             Request::Render {
                 scene,
@@ -149,7 +147,6 @@ impl Studio {
             Request::Layers { scene, longest } => self.draw(&scene, longest, false, true),
             Request::Save { scene, format } => self.save(&scene, format),
             Request::Export { scene, name } => self.export(&scene, &name),
-            Request::Import => self.import(part("archive")?),
         }
     }
 
@@ -202,10 +199,11 @@ impl Studio {
 
     fn choose(&mut self, background: StudioBackground) -> Result<Answer, StudioError> {
         let extent = background.extent(PANORAMA_PICTURE);
+        let thumbnail = background.thumbnail();
         self.environment = EnvironmentCache::default();
         self.background = Some(background);
         let says = json!({ "width": extent.width, "height": extent.height });
-        Ok((says, Vec::new()))
+        Ok((says, vec![thumbnail]))
     }
 
     /// A scene in the preview: smaller, with the objects that are ready, in layers or as one picture.
@@ -281,52 +279,9 @@ impl Studio {
         for placed in &scene.objects {
             named.push(files.add_object(self.objects.get(placed.object)?)?);
         }
-        let described = scene.described(files.add_background(background)?, named)?;
+        let described = scene.described(files.add_background(background), named)?;
         let says = json!({ "name": name });
         Ok((says, vec![files.packed(&described)?]))
-    }
-
-    fn import(&mut self, archive: &[u8]) -> Result<Answer, StudioError> {
-        let (described, files) = SceneFiles::unpacked(archive)?;
-        if described.objects.len() > MAX_OBJECTS {
-            return refused(format!(
-                "the scene has more objects than are possible: at most {MAX_OBJECTS}"
-            ));
-        }
-        let background_name = described.background.to_string_lossy();
-        let content = files.content(&described.background)?.clone();
-        let background = StudioBackground::kept(&background_name, content)?;
-        let numbers: Vec<u32> = (1..).take(described.objects.len()).collect();
-        let scene = PageScene::new(&described, &numbers)?;
-        let mut objects = BTreeMap::new();
-        for (described, &number) in described.objects.iter().zip(&numbers) {
-            objects.insert(number, kept_object(described, &files)?);
-        }
-        let mut parts = Vec::new();
-        let mut says_objects = Vec::new();
-        for (number, object) in &objects {
-            let (mut says, pictures) = told(object);
-            says["object"] = json!(number);
-            says["name"] = json!(object.name);
-            says_objects.push(says);
-            parts.extend(pictures);
-        }
-        parts.push(background.thumbnail());
-        let extent = background.extent(described.size);
-        let says = json!({
-            "scene": serde_json::to_value(&scene)?,
-            "objects": says_objects,
-            "background": {
-                "kind": if background.panorama_id().is_some() { "panorama" } else { "photo" },
-                "id": background.panorama_id().flatten(),
-                "name": background.name,
-                "width": extent.width,
-                "height": extent.height,
-            },
-        });
-        self.objects = Objects(objects);
-        self.choose(background)?;
-        Ok((says, parts))
     }
 }
 
@@ -358,35 +313,10 @@ fn told(object: &StudioObject) -> Answer {
     (says, std::iter::once(picture).chain(mask).collect())
 }
 
-fn kept_object(
-    described: &relight_photo::compositing::ObjectDescription,
-    files: &SceneFiles,
-) -> Result<StudioObject, StudioError> {
-    let name = described.photo.to_string_lossy();
-    let content = files.content(&described.photo)?.clone();
-    match &described.mask {
-        Some(mask) => {
-            let mask = files.content(mask)?;
-            StudioObject::open_masked(&name, content, mask, described.transfer)
-        }
-        None => StudioObject::open(&name, content),
-    }
-}
-
 /// A scene whose files are all in the engine.
 fn in_engine(scene: &PageScene) -> Result<SceneDescription, StudioError> {
     let files = vec![ObjectFiles::default(); scene.objects.len()];
     scene.described(PathBuf::new(), files)
-}
-
-fn backgrounds() -> Result<Answer, StudioError> {
-    let made = made_panoramas()?;
-    let panoramas: Vec<Value> = made
-        .iter()
-        .map(|(scenery, _)| json!({ "id": scenery.id, "name": scenery.name }))
-        .collect();
-    let thumbnails = made.into_iter().map(|(_, thumbnail)| thumbnail).collect();
-    Ok((json!({ "panoramas": panoramas }), thumbnails))
 }
 
 /// The 99th percentile of the shading, which is shown as white.

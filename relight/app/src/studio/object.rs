@@ -5,7 +5,7 @@ use std::path::Path;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbImage};
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{ColourImage, DownscaledFile, Extent, ImageError, StoredImage, Transfer};
+use relight_core::image::{ColourImage, DownscaledFile, Extent, ImageError};
 use relight_photo::compositing::{ObjectDescription, SceneEnvironment};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, UsableImage,
@@ -37,8 +37,6 @@ pub(super) struct StudioObject {
     pub(super) name: String,
     /// The file, as it is kept with a scene.
     pub(super) file: Vec<u8>,
-    /// How integers are encoded, where the file is not to be asked.
-    pub(super) transfer: Option<Transfer>,
     /// Whether the photograph was larger.
     pub(super) downscaled: bool,
     content: Content,
@@ -73,42 +71,18 @@ impl StudioObject {
             return Ok(Self {
                 name: name.to_owned(),
                 file: bytes,
-                transfer: None,
                 downscaled: false,
                 content: Content::Captured(Box::new((captured, relightable))),
             });
         }
-        let opened = OpenedFile::read(name, bytes, None)?;
-        Self::from_file(opened, None)
-    }
-
-    /// Opens a photograph with the mask that was kept with it.
-    ///
-    /// # Errors
-    /// If the photograph or the mask cannot be read.
-    pub(super) fn open_masked(
-        name: &str,
-        bytes: Vec<u8>,
-        mask: &[u8],
-        transfer: Option<Transfer>,
-    ) -> Result<Self, StudioError> {
-        let opened = OpenedFile::read(name, bytes, transfer)?;
-        let image = StoredImage::from_bytes(Path::new(MASK), mask)?;
-        let (mask, _) = image.object_mask(Path::new(MASK))?;
-        let Extent { width, height } = mask.extent();
-        let mask = GrayImage::from_raw(width as u32, height as u32, levels(&mask));
-        Self::from_file(opened, mask)
-    }
-
-    fn from_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, StudioError> {
+        let opened = OpenedFile::read(name, bytes)?;
         let mut object = Self {
             name: opened.name,
             file: opened.bytes,
-            transfer: opened.transfer,
             downscaled: opened.downscaled,
             content: Content::Photo(Box::new(Cut {
                 shown: on_screen(&UsableImage::new(opened.image).image),
-                mask,
+                mask: None,
                 photo: None,
                 preview: None,
             })),
@@ -216,7 +190,7 @@ impl StudioObject {
         let mask = cut.mask.as_ref().map(stored).transpose()?;
         let hints = PhotoHints {
             mask: mask.as_ref().map(|mask| (Path::new(MASK), mask)),
-            transfer: self.transfer,
+            transfer: None,
             rectangle: None,
         };
         match Photo::from_bytes(Path::new(&self.name), &self.file, &hints) {
@@ -307,22 +281,16 @@ impl StudioObject {
 pub(super) struct OpenedFile {
     pub(super) name: String,
     pub(super) bytes: Vec<u8>,
-    pub(super) transfer: Option<Transfer>,
     pub(super) image: ColourImage,
     pub(super) downscaled: bool,
 }
 
 impl OpenedFile {
-    /// Decodes a file, reduced if it is too large. `transfer` is the encoding of integers, in place of
-    /// that of the file.
+    /// Decodes a file, reduced if it is too large.
     ///
     /// # Errors
     /// If it cannot be read as a picture.
-    pub(super) fn read(
-        name: &str,
-        bytes: Vec<u8>,
-        transfer: Option<Transfer>,
-    ) -> Result<Self, StudioError> {
+    pub(super) fn read(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         let path = Path::new(name);
         let extent = stated_extent(&bytes);
         let has_at_most = |most: usize| {
@@ -340,19 +308,15 @@ impl OpenedFile {
         let smaller = if has_at_most(MAX_PIXELS) {
             None
         } else {
-            DownscaledFile::new(path, &bytes, MAX_PIXELS, transfer)?
+            DownscaledFile::new(path, &bytes, MAX_PIXELS, None)?
         };
         let downscaled = smaller.is_some();
-        let (name, bytes, transfer) = match smaller {
-            Some(smaller) => {
-                let name = format!("{}.{}", stem(name), smaller.ending);
-                (name, smaller.bytes, None)
-            }
-            None => (name.to_owned(), bytes, transfer),
+        let (name, bytes) = match smaller {
+            Some(smaller) => (format!("{}.{}", stem(name), smaller.ending), smaller.bytes),
+            None => (name.to_owned(), bytes),
         };
         Ok(Self {
-            image: ColourImage::from_bytes(Path::new(&name), &bytes, transfer)?,
-            transfer,
+            image: ColourImage::from_bytes(Path::new(&name), &bytes, None)?,
             name,
             bytes,
             downscaled,

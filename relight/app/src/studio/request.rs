@@ -10,11 +10,11 @@
 //! | `open_photo`, `open_pixels` | `object`, `name`, a file; or `width`, `height` and pixels | size, whether it has a mask, the picture |
 //! | `mask` | `object`, `rect`, `strokes`, `auto` (without `rect`: by the plain background) | the mask, its area, warnings |
 //! | `decompose` | `object` | albedo, shading, normals, highlight |
-//! | `backgrounds`, `background` | `kind`, `id` or `name`, a file | names and thumbnails; the size of a scene's picture |
+//! | `background` | `kind`, `name`, a file | the size of a scene's picture, a thumbnail |
 //! | `render` | `scene`, `longest`, `before` | a picture, where each object is, notes |
 //! | `layers` | `scene`, `longest` | background, objects and shadows apart: of objects light times alpha, encoded as sRGB, and alpha; of shadows what the light is multiplied with |
 //! | `save` | `scene`, `format` | a PNG or JPEG in full size |
-//! | `export`, `import` | `scene`; an archive | an archive; the scene and all its pictures |
+//! | `export` | `scene` | an archive |
 //! | `close` | `object` | |
 
 use relit_grabcut::Stroke;
@@ -51,8 +51,6 @@ pub(super) enum Request {
     Decompose { object: u32 },
     /// Forgets an object.
     Close { object: u32 },
-    /// The panoramas that are made.
-    Backgrounds,
     /// What the objects are put into.
     Background(BackgroundRequest),
     /// A picture of the scene.
@@ -71,16 +69,12 @@ pub(super) enum Request {
     },
     /// The scene and all it needs in an archive.
     Export { scene: PageScene, name: String },
-    /// Opens such an archive in place of everything.
-    Import,
 }
 
 /// A background.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum BackgroundRequest {
-    /// A panorama that is made.
-    Panorama { id: String },
     /// A photograph, as its file.
     Photo { name: String },
     /// A photograph that the browser has decoded.

@@ -319,7 +319,7 @@ fn make(arguments: &MakeArguments, console: Console) -> CommandResult {
         seed: sources.seed,
         shadows: !sources.no_shadows,
     };
-    let (library, outcome) = read_library(&sources.folders(None), Library::validation, console)?;
+    let (library, outcome) = read_library(&sources.folders(), Library::validation, console)?;
     let out = &arguments.folder.output;
     with_progress("making objects", console, |progress| {
         make_relighting(&recipe, &library, out, progress)

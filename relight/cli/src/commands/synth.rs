@@ -20,7 +20,7 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight synth samples --count 50000 -o warmup
       procedural objects under random light, each with its ground truth
-  relight synth samples --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
+  relight synth samples --count 50000 --meshes meshes --panoramas hdri -o warmup
       with your own files
   relight synth sequences --count 20 --panoramas hdri -o sequences
       whole turns as shards, with their ground truth
@@ -103,9 +103,6 @@ struct PictureArguments {
     light_kind: LightKind,
     #[command(flatten, next_help_heading = "Objects and light")]
     sources: ObjectSources,
-    /// Pictures for textures: .png, .jpg.
-    #[arg(long, value_name = "FOLDER")]
-    textures: Option<PathBuf>,
     /// Keep the meshes' own albedo in all samples [default: in half of them].
     #[arg(long)]
     own_albedo: bool,
@@ -241,7 +238,7 @@ impl PictureArguments {
         } else {
             Library::training
         };
-        let folders = self.sources.folders(self.textures.clone());
+        let folders = self.sources.folders();
         let (library, outcome) = read_library(&folders, part, console)?;
         if self.own_albedo {
             tell_of_plain_meshes(&library, console)?;

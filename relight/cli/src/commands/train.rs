@@ -48,7 +48,7 @@ Examples:
       four processes on one machine, each with its part of every batch; also with RANK, WORLD_SIZE, MASTER_ADDR,
       MASTER_PORT and LOCAL_RANK, as Slurm scripts and Kubernetes operators set them
 
-The folder of a run contains checkpoint.safetensors, losses.csv, validation.png and, at the end, the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
+The folder of a run contains checkpoint.safetensors, losses.csv and, at the end, the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
 
 /// Signals within this time count as one: `timeout` sends two.
 const TOGETHER: Duration = Duration::from_secs(1);

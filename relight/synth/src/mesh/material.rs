@@ -5,31 +5,32 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::{Affine2, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
-use crate::texture::TextureImage;
+use crate::texture::{PictureKind, TextureImage};
 
 /// Roughness where a file has none: a plain, dull surface.
 pub(crate) const DULL: f32 = 1.0;
 
-/// One material of a mesh.
-#[derive(Debug, Clone)]
-pub(crate) struct MeshMaterial {
+/// One material of a mesh. `I`: its pictures, or their names.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct MeshMaterial<I = Arc<TextureImage>> {
     /// Linear red, green and blue, by which the picture is multiplied.
     pub(crate) colour: Vec3,
     /// The colours from place to place.
-    pub(crate) picture: Option<PlacedPicture>,
+    pub(crate) picture: Option<PlacedPicture<I>>,
     /// 0 a mirror, 1 dull.
     pub(crate) roughness: f32,
     /// 0 paint, 1 metal.
     pub(crate) metallic: f32,
     /// Factors of roughness (green) and metal (blue) from place to place.
-    pub(crate) factors: Option<PlacedPicture>,
+    pub(crate) factors: Option<PlacedPicture<I>>,
 }
 
 /// A picture, and the mapping of texture coordinates onto it.
-#[derive(Debug, Clone)]
-pub(crate) struct PlacedPicture {
-    pub(crate) image: Arc<TextureImage>,
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct PlacedPicture<I = Arc<TextureImage>> {
+    pub(crate) image: I,
     /// From texture coordinates to places of the picture, where they differ.
     pub(crate) placed: Option<Affine2>,
 }
@@ -73,6 +74,35 @@ impl Default for MeshMaterial {
             metallic: 0.0,
             factors: None,
         }
+    }
+}
+
+impl<I> MeshMaterial<I> {
+    /// The same with other pictures.
+    ///
+    /// # Errors
+    /// That of `picture`.
+    pub(crate) fn with_pictures<J>(
+        &self,
+        mut picture: impl FnMut(&I, PictureKind) -> Result<J, String>,
+    ) -> Result<MeshMaterial<J>, String> {
+        let mut placed = |of: &Option<PlacedPicture<I>>, kind| {
+            let of = of.as_ref();
+            of.map(|of| {
+                Ok::<_, String>(PlacedPicture {
+                    image: picture(&of.image, kind)?,
+                    placed: of.placed,
+                })
+            })
+            .transpose()
+        };
+        Ok(MeshMaterial {
+            colour: self.colour,
+            picture: placed(&self.picture, PictureKind::Colours)?,
+            roughness: self.roughness,
+            metallic: self.metallic,
+            factors: placed(&self.factors, PictureKind::Numbers)?,
+        })
     }
 }
 

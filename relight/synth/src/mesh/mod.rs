@@ -16,8 +16,8 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::SynthError;
-pub(crate) use material::{MeshMaterial, MeshMaterials, PlacedPicture, SurfaceSample};
-pub(crate) use raw::{NO_TEXTURE, RawMesh};
+pub(crate) use material::{MeshMaterial, MeshMaterials, SurfaceSample};
+pub(crate) use raw::RawMesh;
 
 /// Most triangles that a mesh may have.
 const MAX_TRIANGLES: usize = 20_000_000;

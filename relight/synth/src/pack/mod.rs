@@ -8,17 +8,19 @@
 //! | `origin` | `origin.toml`: who made the files of a folder |
 //! | `prepare` | one object, repaired, judged and made small |
 //! | `orient` | triangles that face one way |
-//! | `codec` | meshes and panoramas as bytes |
+//! | `mesh` | a mesh as bytes |
+//! | `panorama` | a panorama, made small, as bytes |
 //! | `file` | the file: a zip archive with a catalogue |
 //! | `table` | the table of contents, as `.csv` |
 
 mod build;
 mod candidates;
-mod codec;
 mod file;
 mod furniture;
+mod mesh;
 mod orient;
 mod origin;
+mod panorama;
 mod prepare;
 mod table;
 #[cfg(test)]
@@ -30,7 +32,7 @@ use relit_data::shard::Digest;
 use serde::{Deserialize, Serialize};
 
 pub use build::{LibrarySources, LibrarySummary, build_library};
-pub(crate) use file::{LibraryContents, LibraryFilter, read};
+pub(crate) use file::PackedLibrary;
 
 /// What the file of a packed library ends in.
 pub const LIBRARY_EXTENSION: &str = "relib";

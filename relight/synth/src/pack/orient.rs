@@ -21,7 +21,10 @@ const MARGIN: usize = 6;
 
 impl RawMesh {
     /// Turns triangles so that neighbours face alike and each part faces outwards. Vertices are joined.
-    pub(crate) fn orient(&mut self) {
+    ///
+    /// # Errors
+    /// If no triangle has an area.
+    pub(crate) fn orient(&mut self) -> Result<(), String> {
         let parts = self.align();
         // A copy of the shape alone, in the unit sphere.
         let shape = Self {
@@ -29,10 +32,7 @@ impl RawMesh {
             triangles: self.triangles.clone(),
             ..Self::default()
         };
-        // Without a triangle that has an area there is nothing to turn.
-        let Ok(shape) = Mesh::new(shape, CREASE) else {
-            return;
-        };
+        let shape = Mesh::new(shape, CREASE)?;
         let occluder = Occluder::new(&shape, glam::Affine3A::IDENTITY);
         let place = Placement::from_positions(&self.positions);
         for part in parts {
@@ -40,6 +40,7 @@ impl RawMesh {
                 part.iter().for_each(|&triangle| self.turn(triangle));
             }
         }
+        Ok(())
     }
 
     /// The same triangle seen from behind, with all that its corners have.
@@ -204,7 +205,7 @@ mod tests {
     fn triangles_are_turned_as_their_neighbours_are_and_outwards() {
         for is_mixed in [false, true] {
             let mut raw = ball(is_mixed);
-            raw.orient();
+            raw.orient().unwrap();
             let mut all = raw.triangles.iter();
             assert!(all.all(|&triangle| faces_outwards(&raw, triangle)));
         }
@@ -228,7 +229,7 @@ mod tests {
                 .extend(ball.positions.iter().map(|&p| p * radius));
         }
         let mut raw = raw.welded().unwrap();
-        raw.orient();
+        raw.orient().unwrap();
         for &triangle in &raw.triangles {
             let is_outer = raw.positions[triangle[0] as usize].length() > 0.95;
             assert_eq!(faces_outwards(&raw, triangle), is_outer);

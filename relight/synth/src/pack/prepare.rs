@@ -2,16 +2,13 @@
 
 use std::collections::HashSet;
 use std::fmt;
-use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use relit_data::shard::Digest;
 
 use super::candidates::Candidate;
-use super::codec::{PackedMesh, encode_mesh, snap};
-use super::file::MAX_PICTURE_SIDE;
+use super::mesh::{Pictures, encode, snap};
 use crate::mesh::RawMesh;
-use crate::texture::{PictureKind, TextureImage};
 
 /// Most triangles of an object: more are details that small pictures do not show.
 const MAX_TRIANGLES: usize = 30_000;
@@ -65,10 +62,9 @@ impl fmt::Display for Reason {
 
 /// An object that is part of a library.
 pub(super) struct PreparedObject {
-    pub(super) mesh: PackedMesh,
-    pub(super) bytes: Vec<u8>,
-    /// Its pictures as JPEG.
-    pub(super) pictures: Vec<(PictureKind, Vec<u8>)>,
+    pub(super) triangles: usize,
+    pub(super) mesh: Vec<u8>,
+    pub(super) pictures: Pictures,
     /// Of its shape.
     pub(super) digest: Digest,
     /// What its file names and is not used.
@@ -112,20 +108,16 @@ impl PreparedObject {
             let why = "its pictures are cut out, which is not drawn";
             return Err(Reason::new("pictures that are cut out, as of leaves", why));
         }
-        raw.orient();
+        raw.orient().map_err(Reason::unreadable)?;
         let missing = std::mem::take(&mut raw.left_out);
-        let (mesh, bytes, pictures) = encode_mesh(&raw).map_err(Reason::unreadable)?;
-        let packed = |(image, kind): (Arc<TextureImage>, PictureKind)| {
-            let packed = image.packed(kind, MAX_PICTURE_SIDE);
-            let unreadable = |fault| Reason::unreadable(format!("a picture of it: {fault}"));
-            Ok::<_, Reason>((kind, packed.map_err(unreadable)?))
-        };
         let positions = raw.positions.iter().flat_map(Vec3::to_array);
         let shape: Vec<u8> = positions.flat_map(f32::to_le_bytes).collect();
+        let triangles = raw.triangles.len();
+        let (mesh, pictures) = encode(raw).map_err(Reason::unreadable)?;
         Ok(Self {
+            triangles,
             mesh,
-            bytes,
-            pictures: pictures.into_iter().map(packed).collect::<Result<_, _>>()?,
+            pictures,
             digest: Digest::hash(&shape),
             missing,
         })

@@ -146,7 +146,6 @@ impl Case {
         Folders {
             meshes: Some(self.out()),
             panoramas: Some(self.out()),
-            textures: None,
         }
     }
 }

@@ -331,11 +331,7 @@ impl<'a> Run<'a> {
         let Some(metrics_log) = &mut self.metrics_log else {
             return Ok(BTreeMap::new());
         };
-        let Validation {
-            figures,
-            sheet,
-            damage,
-        } = match guarded(|| self.task.validate()) {
+        let Validation { figures, damage } = match guarded(|| self.task.validate()) {
             // The next step sees that, too, and all processes stop after it.
             Err(TrainError::Stopped) => return Ok(BTreeMap::new()),
             made => made?,
@@ -349,11 +345,6 @@ impl<'a> Run<'a> {
             .map(|(name, value)| (format!("validation/{name}"), *value))
             .collect();
         metrics_log.scalars(self.step, &named)?;
-        if let Some(png) = sheet {
-            let path = self.folder.join("validation.png");
-            relit_data::durable::write_whole(&path, &png)
-                .map_err(TrainError::io(&path, "written"))?;
-        }
         observer(self.step, TrainEvent::Validated(&figures));
         Ok(figures)
     }

@@ -102,8 +102,6 @@ impl StepLosses {
 pub struct Validation {
     /// Figures by name.
     pub figures: BTreeMap<String, f64>,
-    /// A sheet of predictions beside the ground truth, a PNG file.
-    pub sheet: Option<Vec<u8>>,
     /// What was damaged in the data, and is not in the figures.
     pub damage: Option<String>,
 }

@@ -31,9 +31,6 @@ pub struct DataSettings {
     /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
-    /// A folder of pictures to lay onto objects.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub textures: Option<PathBuf>,
     /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panoramas: Option<PathBuf>,
@@ -54,7 +51,6 @@ impl Default for DataSettings {
             new_views: 1,
             rays: 128,
             meshes: None,
-            textures: None,
             panoramas: None,
             validation_panoramas: None,
             validation: 48,

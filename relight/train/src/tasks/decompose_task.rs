@@ -1,6 +1,5 @@
 //! The run that trains the decomposing network on photographs of synthetic objects.
 
-use super::contact_sheet::validation_sheet;
 use super::decompose::{PredictedTensors, decompose_losses};
 use super::validation::{ValidationSamples, highlight_figures};
 use crate::data::photographs::Photographs;
@@ -14,9 +13,6 @@ use crate::error::TrainError;
 use crate::settings::DecomposeSettings;
 use relight_photo::nets::{Weights, decomposer_with_heads};
 use relight_synth::SkippedFile;
-
-/// Samples that are shown.
-const SHOWN: usize = 10;
 
 /// Training of the decomposing network.
 #[derive(Debug)]
@@ -81,18 +77,14 @@ impl TrainingTask for DecomposeTask {
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
         let (model, device) = (self.trainable.average(), self.resources.device);
-        let (kind, mut sheet) = (model.precision().kind(), None);
+        let kind = model.precision().kind();
         let figures = self.validation.figures(kind, device, |batch| {
             let prediction =
                 PredictedTensors::from_outputs(&batch.input, &model.forward(&batch.input)?);
-            if sheet.is_none() {
-                sheet = Some(validation_sheet(batch, &prediction, SHOWN)?);
-            }
             figures(batch, &prediction)
         })?;
         Ok(Validation {
             figures,
-            sheet,
             damage: None,
         })
     }

@@ -1,6 +1,5 @@
 //! Networks and their losses: the network of photographs, the network of turns, the paper's phases.
 
-pub(crate) mod contact_sheet;
 pub(crate) mod decompose;
 pub(crate) mod decompose_task;
 pub(crate) mod low_rank;

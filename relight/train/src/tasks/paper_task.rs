@@ -209,11 +209,7 @@ impl TrainingTask for PaperTask {
             damage = turns.take_damage();
             figures.extend(turns.figures(|turns| self.networks.turn_figures(own, turns))?);
         }
-        Ok(Validation {
-            figures,
-            sheet: None,
-            damage,
-        })
+        Ok(Validation { figures, damage })
     }
 
     fn cursor(&self) -> String {

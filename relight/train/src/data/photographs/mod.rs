@@ -79,7 +79,6 @@ impl Photographs {
         data.check_batch(run.batch)?;
         let library = Library::read(&Folders {
             meshes: data.meshes.clone(),
-            textures: data.textures.clone(),
             panoramas: data.panoramas.clone(),
         })?;
         let seed = stream(run.seed, 22);

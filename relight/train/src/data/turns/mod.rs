@@ -83,7 +83,6 @@ impl Turns {
     ) -> Result<Self, TrainError> {
         let library = Library::read(&Folders {
             meshes: settings.meshes.clone(),
-            textures: settings.textures.clone(),
             panoramas: settings.panoramas.clone(),
         })?;
         let seeds = seeds(stream(seed, TRAINING));
@@ -103,7 +102,6 @@ impl Turns {
         let library = Library::read(&Folders {
             // Meshes of a folder are learned from.
             meshes: settings.meshes.clone().filter(|path| is_packed(path)),
-            textures: None,
             panoramas: settings.validation_panoramas.clone(),
         })?;
         let seeds = seeds(VALIDATION);
