@@ -17,17 +17,17 @@ def encode(image, mask):
 
 
 def network_maps(session, image, mask):
-    """Normals (x right, y up, z to the viewer), albedo, shading and highlight (linear), paint (0 to 1), light (9 coefficients)."""
+    """Normals (x right, y up, z to the viewer), albedo, shading and highlight (linear), light (9 coefficients)."""
     sigmoid = lambda v: 1 / (1 + np.exp(-v))
     softplus = lambda v: np.maximum(v, 0) + np.log1p(np.exp(-np.abs(v)))
     planes, white = encode(image, mask)
-    maps, paint, light = session.run(["maps", "paint", "light"], {"input": planes})
+    maps, light = session.run(["maps", "light"], {"input": planes})
     x, y, z, red, green, blue, highlight, offset, share = maps[0]
     normals = np.stack([x, y, softplus(z) + 0.02], 2)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     albedo = sigmoid(np.stack([red, green, blue], 2))
     shading = np.exp(np.clip(offset + sigmoid(share) * (2 * planes[0, 4] - 2), -6, 3))
-    found = [normals, albedo, shading, white * softplus(highlight - 3.5), sigmoid(paint[0, 0])]
+    found = [normals, albedo, shading, white * softplus(highlight - 3.5)]
     return [plane * (mask[..., None] if plane.ndim == 3 else mask) for plane in found] + [light[0]]
 
 

@@ -97,7 +97,6 @@ pub(crate) fn decompose<'py>(
     let options = DecomposeOptions {
         mirror,
         specular: gate(highlights)?,
-        paint: true,
         ..DecomposeOptions::default()
     };
     let ((layers, mask), found, notes) = unlocked(py, || {
@@ -125,10 +124,7 @@ pub(crate) fn decompose<'py>(
 /// The layers of a decomposition by name.
 fn layers(found: &Decomposition, mask: &Planes<1>) -> [(&'static str, Array<f32>); 5] {
     // Paint outside the mask is 0, which would be certain.
-    let mut confidence = match &found.paint {
-        Some(paint) => paint.clone().map(|paint| (2.0 * paint - 1.0).abs()),
-        None => Planes::zeros(mask.extent()),
-    };
+    let mut confidence = found.paint().map(|paint| (2.0 * paint - 1.0).abs());
     let pixels = confidence.planes_mut()[0].iter_mut().zip(mask.plane(0));
     pixels.for_each(|(value, &mask)| *value *= f32::from(u8::from(mask >= 0.5)));
     [

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use relight_core::image::{Extent, Planes};
 use relight_photo::decompose::NetworkInput;
 use relight_photo::nets::paper::{light_net, normal_net, spec_net};
-use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
+use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_light};
 use relight_synth::{Folders, Library, Recipe, SequenceRecipe, write_sequences};
 use relight_train::{
     Adam, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings, DecomposeTask, MetricsLog,
@@ -39,7 +39,7 @@ fn model(graph: Graph, precision: ComputePrecision) -> Model {
 
 #[test]
 fn what_is_trained_answers_as_what_is_shipped() {
-    for graph in [decomposer_with_heads(), normal_net(), light_net()] {
+    for graph in [decomposer_with_light(), normal_net(), light_net()] {
         let weights = Weights::initial(&graph, 3);
         let picture = input(graph.input_channels());
         let flat = Vec::<f32>::try_from(picture.flatten(0, -1)).unwrap();

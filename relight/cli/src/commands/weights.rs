@@ -26,7 +26,7 @@ Examples:
       the paper's Normal-Net";
 
 /// Metadata of an ONNX file of our network of photographs, the same for all weights.
-const DECOMPOSER_FACTS: [(&str, &str); 7] = [
+const DECOMPOSER_FACTS: [(&str, &str); 6] = [
     (
         "input",
         "batch x 7 x height x width, multiples of 32; 0 outside the mask. v: linear light over its 99th percentile (of the brightest \
@@ -38,10 +38,6 @@ const DECOMPOSER_FACTS: [(&str, &str); 7] = [
         "batch x 9 x height x width: normal x, y, z, where z becomes softplus(z) + 0.02 before the length is made 1; albedo, logit of \
          red, green and blue; highlight, softplus(h - 3.5) in units of the percentile; shading, exp of a + sigmoid(b) (2 c - 2), \
          between exp(-6) and exp(3), where c is channel 4 of the input. Albedo and shading are right up to a factor",
-    ),
-    (
-        "paint",
-        "batch x 1 x height x width: logit of how much of a pixel's darkness is paint, not shadow",
     ),
     (
         "light",

@@ -21,8 +21,6 @@ pub(super) struct ComposedLayers {
     pub(super) highlight: Planes<1>,
     /// R S.
     pub(super) diffuse: Planes<3>,
-    /// How much of the darkness is paint.
-    pub(super) paint: Planes<1>,
     /// Energies of I - R S - H and of I under the mask.
     pub(super) residual: ResidualSums,
 }
@@ -153,7 +151,6 @@ impl ComposedLayers {
             shading,
             highlight: maps.highlight,
             diffuse,
-            paint: maps.paint,
             residual,
         }
     }
@@ -225,7 +222,6 @@ mod tests {
             albedo,
             shading,
             highlight,
-            paint: Planes::zeros(EXTENT),
         };
         (picture, maps)
     }
@@ -264,7 +260,6 @@ mod tests {
                 albedo: rows(&maps.albedo, half, first),
                 shading: rows(&maps.shading, half, first),
                 highlight: possible_highlight(&picture, &mask, highlight),
-                paint: Planes::zeros(half),
             };
             (picture, mask, maps)
         };

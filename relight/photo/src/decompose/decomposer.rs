@@ -46,8 +46,6 @@ pub struct DecomposeOptions {
     pub specular: SpecularGate,
     /// Light from which on a channel counts as saturated; a pixel is, where all three are.
     pub saturated_from: f32,
-    /// Whether [`Decomposition::paint`] is wanted.
-    pub paint: bool,
 }
 
 impl Default for DecomposeOptions {
@@ -56,7 +54,6 @@ impl Default for DecomposeOptions {
             mirror: true,
             specular: SpecularGate::default(),
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
-            paint: false,
         }
     }
 }
@@ -75,9 +72,6 @@ pub struct Decomposition {
     pub diffuse: Rgb<Linear>,
     /// The highlight H, grey; 0 where none was separated.
     pub highlight: Planes<1>,
-    /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
-    /// the network cannot tell. `None` if it was not asked for, and of weights without that head.
-    pub paint: Option<Planes<1>>,
     /// The light of order 2 around the object, from its shading and the network's prediction: grey, as the
     /// shading is. The colour of the light is part of the albedo.
     pub light: ShLight,
@@ -116,8 +110,6 @@ pub struct Decomposition {
 /// ```
 pub struct Decomposer {
     scales: Scales,
-    /// Whether the network separates paint from shadow.
-    tells_paint: bool,
 }
 
 impl std::fmt::Debug for Decomposer {
@@ -159,17 +151,12 @@ impl Decomposer {
             }
         };
         let (fine, coarse) = parallel::join(fine, coarse);
-        let found = Self::from_nets(fine?, coarse?);
-        Ok(Self {
-            tells_paint: graph.outputs().iter().any(|output| output.name == "paint"),
-            ..found
-        })
+        Ok(Self::from_nets(fine?, coarse?))
     }
 
     pub(super) fn from_nets(fine: MapNetwork, coarse: Option<MapNetwork>) -> Self {
         Self {
             scales: Scales { fine, coarse },
-            tells_paint: false,
         }
     }
 
@@ -223,14 +210,12 @@ impl Decomposer {
             inside: &inside,
             window,
         };
-        let with_paint = options.paint && self.tells_paint;
         let mut found = Decomposition {
             normals: Normals::new(Planes::zeros(Extent::new(0, 0))),
             albedo: Rgb::new(Planes::zeros(extent)),
             shading: Planes::zeros(extent),
             diffuse: Rgb::new(Planes::zeros(extent)),
             highlight: Planes::zeros(extent),
-            paint: with_paint.then(|| Planes::zeros(extent)),
             light: fitted.light,
             shading_light: fitted.shading_light,
             gloss: fitted.gloss,

@@ -38,8 +38,6 @@ pub struct PredictedMaps {
     pub shading: Planes<1>,
     /// Highlight, grey, in the picture's units.
     pub highlight: Planes<1>,
-    /// How much of the darkness is paint rather than shadow, 0..=1; 0 from a network without that head.
-    pub paint: Planes<1>,
 }
 
 impl NetworkInput {
@@ -84,20 +82,15 @@ impl NetworkInput {
         self.white
     }
 
-    /// What an answer of the network to this picture, [`OUTPUTS`] planes and perhaps that of paint, means.
+    /// What an answer of the network to this picture, [`OUTPUTS`] planes, means.
     ///
     /// # Panics
     /// Where the answer has another size.
     pub fn decode(&self, answer: &[f32]) -> PredictedMaps {
         let (extent, pixels) = (self.extent, self.extent.pixels());
-        let has_paint = answer.len() == (OUTPUTS + 1) * pixels;
-        assert!(
-            has_paint || answer.len() == OUTPUTS * pixels,
-            "size of the answer"
-        );
+        assert_eq!(answer.len(), OUTPUTS * pixels, "size of the answer");
         let (mut normals, mut albedo) = (Planes::zeros(extent), Planes::zeros(extent));
         let (mut shading, mut highlight) = (Planes::zeros(extent), Planes::zeros(extent));
-        let mut paint = Planes::zeros(extent);
         for at in (0..pixels).filter(|&at| self.values[MASK * pixels + at] > 0.5) {
             let of = |channel: usize| answer[channel * pixels + at];
             let (x, y) = (at % extent.width, at / extent.width);
@@ -108,16 +101,12 @@ impl NetworkInput {
             let log_luminance = 2.0 * self.values[LOG_LUMINANCE * pixels + at] - 2.0;
             let log = of(7) + sigmoid(of(8)) * log_luminance;
             shading.set_pixel(x, y, [log.clamp(LOG_SHADING.0, LOG_SHADING.1).exp()]);
-            if has_paint {
-                paint.set_pixel(x, y, [sigmoid(of(OUTPUTS))]);
-            }
         }
         PredictedMaps {
             normals: Normals::new(normals),
             albedo,
             shading,
             highlight,
-            paint,
         }
     }
 }
@@ -184,16 +173,6 @@ mod tests {
                 assert!((0..INPUTS).all(|c| encoded.values()[c * 200 + y * 20 + x] == 0.0));
             }
         }
-    }
-
-    #[test]
-    fn the_answer_about_paint_is_a_probability_and_0_where_there_is_none() {
-        let mask = Planes::filled(Extent::new(20, 10), [1.0]);
-        let encoded = NetworkInput::new(&ramp(), &mask);
-        let without = encoded.decode(&vec![0.3; OUTPUTS * 200]);
-        assert!(without.paint.plane(0).iter().all(|&p| p == 0.0));
-        let with = encoded.decode(&vec![0.0; (OUTPUTS + 1) * 200]);
-        assert!(with.paint.plane(0).iter().all(|&p| p == 0.5));
     }
 
     #[test]

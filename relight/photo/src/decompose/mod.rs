@@ -12,6 +12,7 @@ mod gloss;
 mod light;
 mod mask;
 mod network_output;
+mod paint;
 mod photo;
 #[cfg(test)]
 mod tests;

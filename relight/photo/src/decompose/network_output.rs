@@ -51,8 +51,8 @@ impl MapNetwork {
 }
 
 /// All maps of a picture as one image, in values that can be averaged: normals, log albedo,
-/// log shading, highlight, paint.
-pub(super) type Fields = Planes<9>;
+/// log shading, highlight.
+pub(super) type Fields = Planes<8>;
 
 /// The prediction for a picture.
 pub(super) struct Prediction {
@@ -129,7 +129,6 @@ fn of_maps(maps: PredictedMaps) -> Fields {
         blue,
         maps.shading.plane(0),
         maps.highlight.plane(0),
-        maps.paint.plane(0),
     ];
     for (at, (to, from)) in fields.planes_mut().into_iter().zip(sources).enumerate() {
         for (to, &from) in to.iter_mut().zip(from) {
@@ -154,7 +153,6 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<PredictedMaps
                 2 => |z| z.max(MIN_FACING),
                 3..7 => f32::exp,
                 7 => |value| value.max(0.0),
-                8 => |value| value.clamp(0.0, 1.0),
                 _ => |value| value,
             };
             for (value, &inside) in values.iter_mut().zip(mask) {
@@ -162,14 +160,13 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<PredictedMaps
             }
         }
     });
-    let [x, y, z, red, green, blue, shading, highlight, paint] = fields.into_planes();
+    let [x, y, z, red, green, blue, shading, highlight] = fields.into_planes();
     let normals = Normals::new(Planes::from_planes(extent, [x, y, z])?);
     Ok(PredictedMaps {
         normals: without_gaps(normals, mask),
         albedo: Planes::from_planes(extent, [red, green, blue])?,
         shading: Planes::from_planes(extent, [shading])?,
         highlight: Planes::from_planes(extent, [highlight])?,
-        paint: Planes::from_planes(extent, [paint])?,
     })
 }
 

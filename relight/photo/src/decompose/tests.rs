@@ -2,7 +2,7 @@
 
 use super::network_output::{MapNetwork, NetworkOutput, predict, to_maps};
 use super::*;
-use crate::nets::{INPUTS, LIGHT_PARAMETERS, OUTPUTS, Weights, decomposer, decomposer_with_heads};
+use crate::nets::{INPUTS, LIGHT_PARAMETERS, OUTPUTS, Weights, decomposer, decomposer_with_light};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::light::Normals;
 
@@ -272,27 +272,8 @@ fn a_mask_that_is_empty_or_of_another_size_is_refused() {
 }
 
 #[test]
-fn the_part_of_darkness_that_is_paint_is_made_where_it_is_asked_for() {
-    let weights = Weights::initial(&decomposer_with_heads(), 1);
-    let net = Decomposer::with_side(&weights, 32).unwrap();
-    let extent = Extent::new(40, 30);
-    let picture = Rgb::new(Planes::filled(extent, [0.5, 0.4, 0.3]));
-    let mask = Planes::filled(extent, [1.0]);
-    let paint = |paint| {
-        let options = DecomposeOptions {
-            paint,
-            ..DecomposeOptions::default()
-        };
-        net.decompose(&picture, &mask, &options).unwrap().paint
-    };
-    assert!(paint(false).is_none());
-    let found = paint(true).unwrap();
-    assert!(found.plane(0).iter().all(|part| (0.0..=1.0).contains(part)));
-}
-
-#[test]
 fn what_the_head_says_of_the_light_does_not_move_what_relighting_begins_with() {
-    let with = Weights::initial(&decomposer_with_heads(), 1);
+    let with = Weights::initial(&decomposer_with_light(), 1);
     let without = with.without(LIGHT_PARAMETERS);
     let extent = Extent::new(64, 64);
     let (picture, mask) = (Rgb::new(smooth(extent)), disc(extent, 25.0));

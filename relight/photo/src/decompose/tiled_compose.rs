@@ -109,9 +109,6 @@ impl LayerPlan<'_> {
                 if found.is_glossy {
                     self.put(&layers.highlight, rows.start, &mut found.highlight);
                 }
-                if let Some(paint) = &mut found.paint {
-                    self.put(&layers.paint, rows.start, paint);
-                }
             }
         }
         found.normals = Normals::new(normals);

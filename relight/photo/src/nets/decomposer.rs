@@ -9,9 +9,8 @@
 //! power 1 / 2.2; the mask; log luminance; two chroma differences. All are 0 outside the mask.
 //! Output `maps`, [`OUTPUTS`] channels: normal (3, before its length is made 1), albedo (3, logit),
 //! highlight (1, before softplus), and log shading as two: an offset, and the share of the picture's
-//! own log luminance (logit). With [`decomposer_with_heads`] there are two more. `paint`: how much of a pixel's
-//! darkness is paint rather than shadow (1, logit). `light`, a vector of [`LIGHT_OUTPUTS`] numbers: the coefficients of order 2
-//! of the unblocked grey irradiance from all around, in units of the mean shading.
+//! own log luminance (logit). [`decomposer_with_light`] has one more, `light`, a vector of [`LIGHT_OUTPUTS`] numbers: the
+//! coefficients of order 2 of the unblocked grey irradiance from all around, in units of the mean shading.
 
 use super::graph::{Graph, GroupedLayers, Value};
 use super::weights::Weights;
@@ -30,11 +29,6 @@ const LAYERS: GroupedLayers = GroupedLayers { group: 16 };
 /// Residual blocks between encoder and decoder.
 const MIDDLE: usize = 2;
 
-/// The convolution of the head for paint.
-const PAINT: &str = "paint";
-/// How the names of its parameters begin.
-pub const PAINT_PARAMETERS: &str = "paint.";
-
 /// The output of the head for light.
 const LIGHT: &str = "light";
 /// How the names of its parameters begin.
@@ -44,42 +38,26 @@ pub const LIGHT_OUTPUTS: usize = 9;
 /// Numbers between its layers.
 const LIGHT_HIDDEN: usize = 128;
 
-/// The heads that weights may have or not.
-#[derive(Debug, Clone, Copy)]
-struct Heads {
-    paint: bool,
-    light: bool,
-}
-
 /// The network; width and height of its input are multiples of 32.
 pub fn decomposer() -> Graph {
-    build(Heads {
-        paint: false,
-        light: false,
-    })
+    build(false)
 }
 
-/// The same network with a head that separates paint from shadow, and one that predicts the light.
-pub fn decomposer_with_heads() -> Graph {
-    build(Heads {
-        paint: true,
-        light: true,
-    })
+/// The same network with a head that predicts the light.
+pub fn decomposer_with_light() -> Graph {
+    build(true)
 }
 
-/// The network of these weights: with the heads for paint and for light, if they have them.
+/// The network of these weights: with the head for light, if they have it.
 pub fn decomposer_of(weights: &Weights) -> Graph {
-    let have = |prefix: &str| {
-        let mut names = weights.iter().map(|(name, _)| name);
-        names.any(|name| name.trim_start_matches("module.").starts_with(prefix))
-    };
-    build(Heads {
-        paint: have(PAINT_PARAMETERS),
-        light: have(LIGHT_PARAMETERS),
-    })
+    let mut names = weights.iter().map(|(name, _)| name);
+    build(names.any(|name| {
+        name.trim_start_matches("module.")
+            .starts_with(LIGHT_PARAMETERS)
+    }))
 }
 
-fn build(heads: Heads) -> Graph {
+fn build(tells_light: bool) -> Graph {
     let (mut net, input) = Graph::new("decomposer", INPUTS);
     let blocks = net.pixel_unshuffle(input, BLOCK);
     let features = encode(&mut net, blocks);
@@ -100,12 +78,7 @@ fn build(heads: Heads) -> Graph {
     let maps = net.convolution("head.1".to_owned(), value, OUTPUTS * BLOCK * BLOCK, 1);
     let maps = net.pixel_shuffle(maps, BLOCK);
     net.output("maps", maps);
-    if heads.paint {
-        let paint = net.convolution(PAINT.to_owned(), value, BLOCK * BLOCK, 1);
-        let paint = net.pixel_shuffle(paint, BLOCK);
-        net.output(PAINT, paint);
-    }
-    if heads.light {
+    if tells_light {
         let light = light(&mut net, middle);
         net.output(LIGHT, light);
     }
@@ -144,18 +117,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_tell_which_heads_their_network_has() {
-        let (plain, more) = (decomposer(), decomposer_with_heads());
+    fn weights_tell_whether_their_network_tells_light() {
+        let (plain, more) = (decomposer(), decomposer_with_light());
         assert_eq!(plain.outputs().len(), 1);
-        let paint = more.node(more.outputs()[1].value);
-        assert_eq!((paint.channels, paint.scale), (1, Some(1)));
-        let light = more.node(more.outputs()[2].value);
+        let light = more.node(more.outputs()[1].value);
         assert_eq!((light.channels, light.scale), (LIGHT_OUTPUTS, None));
-        let paint_alone = build(Heads {
-            paint: true,
-            light: false,
-        });
-        for graph in [plain, more, paint_alone] {
+        for graph in [plain, more] {
             assert_eq!(decomposer_of(&Weights::initial(&graph, 1)), graph);
         }
     }

@@ -145,12 +145,12 @@ fn clear_upper_halves() {}
 
 #[cfg(test)]
 mod tests {
-    use super::super::decomposer_with_heads;
+    use super::super::decomposer_with_light;
     use super::*;
 
     #[test]
     fn one_file_of_half_precision_answers_pictures_of_any_size() {
-        let graph = decomposer_with_heads();
+        let graph = decomposer_with_light();
         let weights = Weights::initial(&graph, 5);
         let bytes = weights.to_safetensors(WeightPrecision::Half, None).unwrap();
         let weights = Weights::from_bytes(&bytes).unwrap();

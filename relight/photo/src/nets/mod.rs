@@ -31,8 +31,8 @@ mod weights;
 
 pub use codec::WeightPrecision;
 pub use decomposer::{
-    INPUTS, LIGHT_OUTPUTS, LIGHT_PARAMETERS, OUTPUTS, PAINT_PARAMETERS, decomposer, decomposer_of,
-    decomposer_with_heads,
+    INPUTS, LIGHT_OUTPUTS, LIGHT_PARAMETERS, OUTPUTS, decomposer, decomposer_of,
+    decomposer_with_light,
 };
 pub use error::NetError;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Parameter, Role, Value};

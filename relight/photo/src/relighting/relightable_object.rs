@@ -83,10 +83,7 @@ impl RelightableObject {
     ) -> Result<Self, InsertError> {
         let cut = Cut::new(photo, (mask, alpha))?;
         let foreground = Rgb::new(cut.matte.foreground.clone());
-        let options = DecomposeOptions {
-            paint: true,
-            ..*options
-        };
+        let options = DecomposeOptions { ..*options };
         let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
         Self::from_parts(cut, &found)
     }
@@ -160,8 +157,7 @@ impl RelightableObject {
             &wanted,
             found.region.side,
         );
-        let paint = found.paint.clone();
-        let paint = paint.map(|paint| paint.extended(&known, &wanted));
+        let paint = found.paint().extended(&known, &wanted);
         let own =
             DiffuseLayer::new(&found.shading_light, DiffuseForm::Irradiance).shading(&normals);
         let shading = found.shading.clone().extended(&known, &wanted);
@@ -195,7 +191,7 @@ impl RelightableObject {
         Ok(Self {
             place: cut.place,
             photo: cut.photo,
-            shading: Shading::new(&shading, own.planes(), &wanted).doubted(paint.as_ref(), &wanted),
+            shading: Shading::new(&shading, own.planes(), &wanted).doubted(&paint, &wanted),
             matte: cut.matte,
             fringe: cut.fringe,
             normals,

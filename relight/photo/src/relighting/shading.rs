@@ -66,13 +66,13 @@ struct Doubt {
 }
 
 /// The part of a change's deviation from the mean that is kept at a place of this `ln(S + d)`; `paint` is the part of its
-/// darkness expected to be paint, if known.
-fn kept_beside(seen: f32, paint: Option<f32>) -> f32 {
+/// darkness expected to be paint.
+fn kept_beside(seen: f32, paint: f32) -> f32 {
     let (dark, bright) = DARK_AND_BRIGHT;
     let (dark, bright) = ((dark + DARK).ln(), (bright + DARK).ln());
     let towards_bright = ((seen - dark) / (bright - dark)).clamp(0.0, 1.0);
     let kept = KEPT_BESIDE.0 + towards_bright * (KEPT_BESIDE.1 - KEPT_BESIDE.0);
-    let certainty = paint.map_or(0.5, |paint| (2.0 * paint - 1.0).abs());
+    let certainty = (2.0 * paint - 1.0).abs();
     (kept + KEPT_IF_CERTAIN * (certainty - 0.5)).clamp(0.0, 1.0)
 }
 
@@ -140,8 +140,8 @@ impl Shading {
 
     /// The same for a photograph, with partial confidence, where it is `wanted`; `paint` is the part of its darkness expected to
     /// be paint, 0..=1.
-    pub(crate) fn doubted(mut self, paint: Option<&Planes<1>>, wanted: &[bool]) -> Self {
-        let kept = |(at, &seen)| kept_beside(seen, paint.map(|paint| paint.plane(0)[at]));
+    pub(crate) fn doubted(mut self, paint: &Planes<1>, wanted: &[bool]) -> Self {
+        let kept = |(at, &seen)| kept_beside(seen, paint.plane(0)[at]);
         self.doubt = Some(Doubt {
             sample: evenly(wanted),
             kept_beside: self.seen.iter().enumerate().map(kept).collect(),
@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn a_change_is_believed_less_where_nobody_can_tell_paint_from_shadow() {
-        let trust = |paint| kept_beside(0.35_f32.ln(), Some(paint));
+        let trust = |paint| kept_beside(0.35_f32.ln(), paint);
         assert!((trust(0.0) - trust(1.0)).abs() < 1e-6);
         assert!((trust(1.0) - trust(0.5) - 0.5).abs() < 1e-6);
     }

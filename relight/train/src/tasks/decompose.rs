@@ -2,7 +2,6 @@
 
 use tch::Tensor;
 
-use super::shadow_vs_paint::ShadowVsPaint;
 use crate::data::sample::TruthBatch;
 use crate::engine::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
 use crate::engine::tensors::{grey, over_channels};
@@ -24,8 +23,7 @@ const FAINT_ENERGY: f64 = 1e-4;
 
 /// Loss coefficients, those of the built-in weights: scale-invariant errors of shading and albedo; that of the picture over the
 /// shading, against albedo, in parts of the others; the same errors in windows; steps from pixel to pixel of log shading and log
-/// albedo; distance of the normals; mean error of the highlights; energy of that error; cross entropy of what is paint of a
-/// pixel's darkness; distance of the light.
+/// albedo; distance of the normals; mean error of the highlights; energy of that error; distance of the light.
 const WHOLE: f64 = 1.5;
 const QUOTIENT: f64 = 0.5;
 const WINDOWS: f64 = 0.75;
@@ -33,7 +31,6 @@ const GRADIENT: f64 = 0.2;
 const NORMALS: f64 = 1.0;
 const HIGHLIGHT: f64 = 1.0;
 const HIGHLIGHT_ENERGY: f64 = 0.2;
-const PAINT: f64 = 0.1;
 const LIGHT: f64 = 0.1;
 
 /// The network's predictions as maps on tensors, `batch x channels x height x width`: what
@@ -48,8 +45,6 @@ pub struct PredictedTensors {
     pub shading: Tensor,
     /// Highlight in whites, 1 channel.
     pub highlight: Tensor,
-    /// How much of the darkness is paint, as a logit, 1 channel; `None` for a network without that head.
-    pub paint: Option<Tensor>,
     /// The light, `batch x 9` as [`relight_photo::decompose::PredictedLight`] has it; none of a network without that head.
     pub light: Option<Tensor>,
 }
@@ -57,10 +52,8 @@ pub struct PredictedTensors {
 impl PredictedTensors {
     /// The maps for the network's input and its outputs.
     pub fn from_outputs(input: &Tensor, outputs: &[Tensor]) -> Self {
-        let head = |at: usize| outputs.get(at).map(Tensor::shallow_clone);
         Self {
-            paint: head(1),
-            light: head(2),
+            light: outputs.get(1).map(Tensor::shallow_clone),
             ..Self::new(input, &outputs[0])
         }
     }
@@ -79,7 +72,6 @@ impl PredictedTensors {
             albedo: part(3, 3).sigmoid(),
             shading: log_shading.exp(),
             highlight: (part(6, 1) - f64::from(HIGHLIGHT_OFFSET)).softplus(),
-            paint: None,
             light: None,
         }
     }
@@ -136,10 +128,6 @@ pub(crate) fn decompose_losses(batch: &TruthBatch, prediction: &PredictedTensors
     terms.add_mean("highlight", HIGHLIGHT, highlight);
     let energy = highlight_energy_error(batch, prediction);
     terms.add_mean("highlight_energy", HIGHLIGHT_ENERGY, energy);
-    if let Some(logit) = &prediction.paint {
-        let truth = ShadowVsPaint::new(&batch.albedo, &batch.shading, mask);
-        terms.add_mean("paint", PAINT, truth.cross_entropy(logit));
-    }
     if let Some(light) = &prediction.light {
         let distance = relative_distance(light, &batch.light);
         terms.add_mean("light", LIGHT, distance);

@@ -11,7 +11,7 @@ use crate::engine::tensors::grey;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::DecomposeSettings;
-use relight_photo::nets::{Weights, decomposer_with_heads};
+use relight_photo::nets::{Weights, decomposer_with_light};
 use relight_synth::SkippedFile;
 
 /// Training of the decomposing network.
@@ -37,7 +37,7 @@ impl DecomposeTask {
         let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
         let (size, count) = (settings.data.size, settings.data.validation);
         let validation = ValidationSamples::new(photographs.library(), size, count);
-        let graph = decomposer_with_heads();
+        let graph = decomposer_with_light();
         let trainable = Trainable::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             photographs,

@@ -7,6 +7,5 @@ pub(crate) mod paper_layers;
 pub(crate) mod paper_networks;
 pub(crate) mod paper_phases;
 pub(crate) mod paper_task;
-pub(crate) mod shadow_vs_paint;
 pub(crate) mod turn_task;
 pub(crate) mod validation;
