@@ -16,6 +16,9 @@ const END: f64 = 0.03;
 const ROWS: f64 = 0.012;
 /// Squared distance of equal surfaces, in squared units of the features.
 const ALIKE: f32 = 1.0;
+/// Where the end of a row changes by less than this, as a feature, it is overexposed: without noise, and so much stricter.
+const CLIPPED: f32 = 0.3;
+const CLIPPED_ALIKE: f32 = 0.05;
 /// Evidence of a pixel that equals its row's ends, in units of the log-likelihood.
 const STRENGTH: f32 = 8.0;
 /// Evidence of a pixel in the object's shadow on the table.
@@ -112,7 +115,10 @@ impl Ends {
         let rows = y.saturating_sub(self.reach)..(y + self.reach + 1).min(self.left.len());
         rows.flat_map(|row| [&self.left[row], &self.right[row]])
             .flatten()
-            .map(|end| squared_distance(feature, end))
+            .map(|end| {
+                let alike = if end[3] < CLIPPED { CLIPPED_ALIKE } else { 1.0 };
+                squared_distance(feature, end) / alike
+            })
             .fold(f32::INFINITY, f32::min)
     }
 }

@@ -155,8 +155,7 @@ impl TurnField {
         };
         let edge = self.boundary(part, &mask.minus(part));
         let has_edge = edge.is_none_or(|edge| edge >= SURE_EDGE);
-        part.share_in(&table.shaded) > MOSTLY
-            || has_edge && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
+        has_edge && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
             || self.ends_without_edge(part, mask)
     }
 
