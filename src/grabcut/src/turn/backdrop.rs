@@ -169,6 +169,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_nearly_as_white_as_an_overexposed_room_is_not_the_room() {
+        let feature = |at: usize| match (12..28).contains(&(at % 40)) {
+            true => [33.2, 0.0, 0.0, 0.8, 0.2],
+            false => [33.3, 0.0, 0.0, 0.0, 0.0],
+        };
+        let features: Vec<[f32; 5]> = (0..40 * 30).map(feature).collect();
+        let backdrop = Backdrop::new(&features, &no_table(), (40, 30));
+        assert!(!backdrop.alike.bits()[15 * 40 + 20] && backdrop.alike.bits()[15 * 40 + 5]);
+    }
+
+    #[test]
     fn the_rim_between_room_and_table_is_background_and_a_thin_part_of_the_object_is_not() {
         // A stick in the room, the rim below it, the table below that.
         let stick = |x: usize, y: usize| x == 20 && (5..12).contains(&y);

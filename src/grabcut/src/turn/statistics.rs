@@ -613,3 +613,25 @@ fn cut_turn(
     refine(&turn.fine, &mut labels, &coarse_labels, size, &mut models);
     Ok((labels, models))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outline_of_a_dark_object_lasts_and_the_edge_of_a_shadow_passes_by() {
+        let mut turn = TurnFrames::new(80, 60);
+        for frame in 0..32 {
+            turn.push(&RgbImage::from_fn(80, 60, |x, y| {
+                let light = if x < 2 * frame + 8 { 40 } else { 60 };
+                let level = if y < 30 { light - 8 } else { light };
+                image::Rgb([level; 3])
+            }));
+        }
+        let field = TurnStatistics::new(&turn).fine;
+        let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
+        let outline = field.outline(&all.map(|at, _| at / 80 < 30));
+        let shadow = field.outline(&all.map(|at, _| at % 80 < 40));
+        assert!(outline > 0.9 && shadow < 0.3, "{outline} {shadow}");
+    }
+}
