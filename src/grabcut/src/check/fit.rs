@@ -182,8 +182,8 @@ impl<'a> MaskCheck<'a> {
         let Some(table) = &self.turn.fine.seen_table else {
             return self.mask.minus(&self.mask);
         };
-        let table = table.as_bright.or(&table.shaded);
         let wide = table
+            .as_bright
             .and(&object)
             .opened(NARROW)
             .dilated(NARROW)

@@ -16,6 +16,9 @@ const END: f64 = 0.03;
 const ROWS: f64 = 0.012;
 /// Squared distance of equal surfaces, in squared units of the features.
 const ALIKE: f32 = 1.0;
+/// Where the end of a row changes by less than this, as a feature, it is overexposed: without noise, and so much stricter.
+const CLIPPED: f32 = 0.3;
+const CLIPPED_ALIKE: f32 = 0.05;
 /// Evidence of a pixel that equals its row's ends, in units of the log-likelihood.
 const STRENGTH: f32 = 8.0;
 /// Evidence of a pixel in the object's shadow on the table.
@@ -112,7 +115,10 @@ impl Ends {
         let rows = y.saturating_sub(self.reach)..(y + self.reach + 1).min(self.left.len());
         rows.flat_map(|row| [&self.left[row], &self.right[row]])
             .flatten()
-            .map(|end| squared_distance(feature, end))
+            .map(|end| {
+                let alike = if end[3] < CLIPPED { CLIPPED_ALIKE } else { 1.0 };
+                squared_distance(feature, end) / alike
+            })
             .fold(f32::INFINITY, f32::min)
     }
 }
@@ -160,6 +166,17 @@ mod tests {
         }
         assert!(backdrop.evidence[0] < -5.0);
         assert!(backdrop.evidence[15 * 40 + 20] > -0.1);
+    }
+
+    #[test]
+    fn what_is_nearly_as_white_as_an_overexposed_room_is_not_the_room() {
+        let feature = |at: usize| match (12..28).contains(&(at % 40)) {
+            true => [33.2, 0.0, 0.0, 0.8, 0.2],
+            false => [33.3, 0.0, 0.0, 0.0, 0.0],
+        };
+        let features: Vec<[f32; 5]> = (0..40 * 30).map(feature).collect();
+        let backdrop = Backdrop::new(&features, &no_table(), (40, 30));
+        assert!(!backdrop.alike.bits()[15 * 40 + 20] && backdrop.alike.bits()[15 * 40 + 5]);
     }
 
     #[test]

@@ -118,14 +118,11 @@ impl TurnField {
     }
 
     /// Whether a part of a mask that seems to be background is so clearly that the mask may be called wrong. In a room
-    /// in which nothing moves, only the table is clear.
+    /// in which nothing moves, only the table is clear, and what is overexposed.
     pub(crate) fn is_clearly_background(&self, part: &Bitmap, mask: &Bitmap, moves: bool) -> bool {
         let beside = self.beside(part, &mask.minus(part));
         if self.is_like_table(part, &beside) {
             return self.shows_table(part, mask);
-        }
-        if !moves {
-            return false;
         }
         let above = self
             .seen_table
@@ -135,6 +132,9 @@ impl TurnField {
         if above.share_in(&self.white) > MOSTLY {
             // A white object may be overexposed as well.
             return self.mean_light(&beside) < NEARLY_WHITE;
+        }
+        if !moves {
+            return false;
         }
         let ground = self.ground(above, mask);
         match self
@@ -155,8 +155,7 @@ impl TurnField {
         };
         let edge = self.boundary(part, &mask.minus(part));
         let has_edge = edge.is_none_or(|edge| edge >= SURE_EDGE);
-        part.share_in(&table.shaded) > MOSTLY
-            || has_edge && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
+        has_edge && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
             || self.ends_without_edge(part, mask)
     }
 

@@ -6,7 +6,6 @@ pub(crate) mod edge;
 pub(crate) mod enclosed_regions;
 pub(crate) mod frame_shift;
 pub(crate) mod pixel_series;
-pub(crate) mod rim;
 pub(crate) mod statistics;
 pub(crate) mod subspace;
 pub(crate) mod table;

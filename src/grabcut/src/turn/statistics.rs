@@ -12,7 +12,6 @@ use super::backdrop::Backdrop;
 use super::edge;
 use super::frame_shift;
 use super::pixel_series::PixelSeries;
-use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
 use super::table_model::{SeenTable, TableModel, TurnObservations};
 use super::temporal_evidence::{Curves, TemporalEvidence, luminance};
@@ -59,6 +58,10 @@ const CONSTANT_WEIGHT: f32 = 0.25;
 const STILL: f32 = 1.0;
 /// A larger contrast counts as this.
 const MAX_CONTRAST: f32 = 100.0;
+/// A step of the brightness, as a logarithm, that is an edge: of this size or larger.
+const EDGE: f32 = 0.05;
+/// Added to a luminance, 0..=1, before its logarithm: noise counts little below.
+const DARK: f32 = 0.003;
 /// A pixel is white where all channels have at least this level.
 const WHITE: u8 = 250;
 /// And is so in this share of the frames.
@@ -205,6 +208,8 @@ pub(crate) struct TurnField {
     features: Vec<[f32; 5]>,
     /// To the neighbours in [`DIRECTIONS_AHEAD`].
     contrasts: Vec<[f32; 4]>,
+    /// In which share of the frames there is an edge next to a pixel: a shadow's passes by, an outline stays.
+    lasting: Vec<f32>,
     /// Pixels that are background by the ends of their rows.
     pub(crate) backdrop: Bitmap,
     pub(crate) table: Turntable,
@@ -225,10 +230,12 @@ impl TurnField {
         let mut sum = vec![[0.0_f32; 3]; count];
         let mut square = vec![[0.0_f32; 2]; count];
         let mut difference = vec![[0.0_f32; 4]; count];
+        let mut steps = vec![[0.0_f32; 4]; count];
         let mut curves = Curves::new(frames.len(), count);
         for (number, frame) in frames.iter().enumerate() {
             let lab: Vec<[f32; 3]> = frame.pixels().map(|p| colours.lab(p.0)).collect();
             curves.add(number, &lab);
+            let logs = smooth_logs(&lab, size);
             for (at, &[l, a, b]) in lab.iter().enumerate() {
                 sum[at].iter_mut().zip([l, a, b]).for_each(|(s, v)| *s += v);
                 square[at][0] += l * l;
@@ -236,6 +243,7 @@ impl TurnField {
                 for (to, &direction) in DIRECTIONS_AHEAD.iter().enumerate() {
                     if let Some(next) = neighbour(at, direction, size) {
                         difference[at][to] += squared_distance(&lab[at], &lab[next]);
+                        steps[at][to] += ((logs[at] - logs[next]) / EDGE).powi(2).min(1.0);
                     }
                 }
             }
@@ -261,12 +269,15 @@ impl TurnField {
                 };
                 let constant = squared_distance(&mean[at], &mean[next]);
                 let all = difference[at][to] / many - (1.0 - CONSTANT_WEIGHT) * constant;
-                all.clamp(0.0, MAX_CONTRAST)
+                let lasting = MAX_CONTRAST * steps[at][to] / many;
+                (all.clamp(0.0, MAX_CONTRAST) * lasting).sqrt()
             })
         };
         let features: Vec<[f32; 5]> = (0..count).map(feature).collect();
         let contrasts: Vec<[f32; 4]> = (0..count).map(contrast).collect();
-        let table = find_turntable(&features, &largest(&contrasts, size), size);
+        let lasting = largest(&steps, size).into_iter().map(|steps| steps / many);
+        let lasting: Vec<f32> = lasting.collect();
+        let table = find_turntable(&features, &lasting, size);
         let backdrop = Backdrop::new(&features, &table, size);
         Self {
             size,
@@ -278,6 +289,7 @@ impl TurnField {
             table,
             features,
             contrasts,
+            lasting,
         }
     }
 }
@@ -346,18 +358,17 @@ impl TurnField {
         features.map(|feature| feature[0] / COLOUR_WEIGHT).collect()
     }
 
-    /// How strong the contrast is along an outline.
+    /// In which share of the frames there is an edge along an outline.
     pub(crate) fn outline(&self, object: &Bitmap) -> f32 {
         let boundary = self.boundary(object, &object.inverted());
         boundary.unwrap_or(0.0)
     }
 
-    /// How strong the contrast is along the boundary between two parts, which have its size; `None` if they do not
-    /// touch.
+    /// In which share of the frames there is an edge along the boundary between two parts, which have its size; `None` if
+    /// they do not touch.
     pub(crate) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
         let (columns, rows) = self.size;
         let (one, other) = (one.bits(), other.bits());
-        let scale = grab_cut::contrast_scale(self);
         let (mut sum, mut edges) = (0.0, 0.0);
         for at in 0..columns * rows {
             for direction in [4, 6] {
@@ -365,18 +376,12 @@ impl TurnField {
                 let is_edge = |next: &usize| one[at] && other[*next] || other[at] && one[*next];
                 if let Some(next) = next.filter(is_edge) {
                     // The edge may lie a pixel beside it.
-                    let strongest = self.strongest_near(at).max(self.strongest_near(next));
-                    sum += 1.0 - (-scale * strongest).exp();
+                    sum += self.lasting[at].max(self.lasting[next]);
                     edges += 1.0;
                 }
             }
         }
         (edges > 0.0).then_some(sum / edges)
-    }
-
-    fn strongest_near(&self, at: usize) -> f32 {
-        let contrasts = self.contrasts[at].iter();
-        contrasts.copied().fold(0.0, f32::max)
     }
 
     /// Takes what equals the ends of its row for background at first. False, and nothing is done, if that
@@ -398,6 +403,23 @@ impl TurnField {
         }
         true
     }
+}
+
+/// The logarithms of the luminances, each averaged with its neighbours against noise.
+fn smooth_logs(lab: &[[f32; 3]], (width, height): (usize, usize)) -> Vec<f32> {
+    let light: Vec<f32> = lab.iter().map(|lab| luminance(lab[0]) + DARK).collect();
+    let three = |values: &[f32], at: usize, step: usize, place: usize, length: usize| {
+        let before = if place > 0 { at - step } else { at };
+        let after = if place + 1 < length { at + step } else { at };
+        (values[before] + values[at] + values[after]) / 3.0
+    };
+    let all = 0..lab.len();
+    let beside = all
+        .clone()
+        .map(|at| three(&light, at, 1, at % width, width));
+    let beside: Vec<f32> = beside.collect();
+    let smooth = all.map(|at| three(&beside, at, width, at / width, height).ln());
+    smooth.collect()
 }
 
 /// The pixels that are white in nearly every frame: overexposed.
@@ -517,9 +539,6 @@ pub(crate) fn segment(
             fine.restored(object, before)
         });
     }
-    change(&mut labels, fine.size, |object| {
-        without_rim(object, &fine.table, fine.size)
-    });
     change(&mut labels, fine.size, |object| fine.completed(object));
     change(&mut labels, fine.size, |object| {
         edge::along_series(&turn.series, object)
@@ -593,4 +612,26 @@ fn cut_turn(
     let size = coarse.size;
     refine(&turn.fine, &mut labels, &coarse_labels, size, &mut models);
     Ok((labels, models))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outline_of_a_dark_object_lasts_and_the_edge_of_a_shadow_passes_by() {
+        let mut turn = TurnFrames::new(80, 60);
+        for frame in 0..32 {
+            turn.push(&RgbImage::from_fn(80, 60, |x, y| {
+                let light = if x < 2 * frame + 8 { 40 } else { 60 };
+                let level = if y < 30 { light - 8 } else { light };
+                image::Rgb([level; 3])
+            }));
+        }
+        let field = TurnStatistics::new(&turn).fine;
+        let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
+        let outline = field.outline(&all.map(|at, _| at / 80 < 30));
+        let shadow = field.outline(&all.map(|at, _| at % 80 < 40));
+        assert!(outline > 0.9 && shadow < 0.3, "{outline} {shadow}");
+    }
 }

@@ -8,10 +8,8 @@ const MAX_LIGHT: f32 = 50.0 / 3.0;
 const MAX_CHROMA: f32 = 14.0 / 3.0;
 /// Largest change of the brightness, as a feature.
 const MAX_CHANGE: f32 = 7.5;
-/// A contrast of so many times the median of what is dark and below is structure.
-const STRUCTURE: f32 = 3.0;
-/// And at least and at most so much.
-const STRUCTURE_BOUNDS: (f32, f32) = (0.3, 30.0);
+/// What has edges in this share of the frames is not plain: those of shadows pass by.
+const STRUCTURE: f32 = 0.3;
 /// The table covers at least this share of the frame.
 const MIN_PART: f64 = 0.01;
 /// It comes as near to the lower border as this share of the height, or is this share of the width wide.
@@ -22,8 +20,6 @@ const WIDE: f64 = 0.5;
 const SHADOW_LIGHT: f32 = 0.3;
 /// How far the colour of a shadow is from the table's, as a feature.
 const SHADOW_COLOUR: f32 = 0.8;
-/// A contrast of so many times the square of the table's brightness is an outline and ends a shadow.
-const OUTLINE: f32 = 0.009 * 9.0;
 /// A shadow reaches at most this share of the frame's height beyond the plain surface.
 const SHADOW_REACH: f64 = 0.08;
 
@@ -39,11 +35,10 @@ pub(crate) struct Turntable {
 }
 
 /// The table, from the features of a turn (average L, a, b, changes of light and colour)
-/// and the largest contrast of each pixel to its neighbours. Empty if none is
-/// found.
+/// and the share of frames with an edge next to each pixel. Empty if none is found.
 pub(crate) fn find_turntable(
     features: &[[f32; 5]],
-    contrast: &[f32],
+    lasting: &[f32],
     size: (usize, usize),
 ) -> Turntable {
     let (width, height) = size;
@@ -51,10 +46,7 @@ pub(crate) fn find_turntable(
         let [light, a, b, change, _] = features[at];
         light < MAX_LIGHT && a.hypot(b) < MAX_CHROMA && change < MAX_CHANGE
     };
-    let below = height * 2 / 3 * width..width * height;
-    let below = below.filter(|&at| dark(at)).map(|at| contrast[at]);
-    let structure = structure_from(below.collect());
-    let plain = (0..features.len()).map(|at| dark(at) && contrast[at] < structure);
+    let plain = (0..features.len()).map(|at| dark(at) && lasting[at] < STRUCTURE);
     let plain = Bitmap::new((width as u32, height as u32), plain);
     // Away from its border, so that it does not run into the object through a gap in the outline.
     let inner = plain.inverted().dilated(1).inverted();
@@ -80,7 +72,7 @@ pub(crate) fn find_turntable(
         });
     let is_table = |at: usize, _| lowest.is_some() && components.at(at) == lowest;
     let surface = inner.map(is_table).dilated(1);
-    let shadow = shadow(features, contrast, structure, &surface, size);
+    let shadow = shadow(features, lasting, &surface, size);
     Turntable {
         surface,
         shadow,
@@ -91,20 +83,18 @@ pub(crate) fn find_turntable(
 /// Grows from the surface, row by row and column by column, over what may be its shadow.
 fn shadow(
     features: &[[f32; 5]],
-    contrast: &[f32],
-    structure: f32,
+    lasting: &[f32],
     surface: &Bitmap,
     size: (usize, usize),
 ) -> Bitmap {
     let Some(mean) = mean(features, surface) else {
         return surface.clone();
     };
-    let outline = structure.max(OUTLINE * mean[0] * mean[0]);
     let may_be = |at: usize| {
         let [light, a, b, ..] = features[at];
         light < mean[0] + SHADOW_LIGHT
             && (a - mean[1]).hypot(b - mean[2]) < SHADOW_COLOUR
-            && contrast[at] < outline
+            && lasting[at] < STRUCTURE
     };
     let mut grown = surface.clone();
     for _ in 0..(size.1 as f64 * SHADOW_REACH) as usize {
@@ -124,22 +114,13 @@ fn mean(features: &[[f32; 5]], surface: &Bitmap) -> Option<[f32; 3]> {
     (count > 0).then(|| sum.map(|s| s / count as f32))
 }
 
-fn structure_from(mut contrast: Vec<f32>) -> f32 {
-    if contrast.is_empty() {
-        return STRUCTURE_BOUNDS.0;
-    }
-    let middle = contrast.len() / 2;
-    let (_, median, _) = contrast.select_nth_unstable_by(middle, f32::total_cmp);
-    (STRUCTURE * *median).clamp(STRUCTURE_BOUNDS.0, STRUCTURE_BOUNDS.1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const SIZE: (usize, usize) = (40, 30);
 
-    /// A dark object on a dark table in a bright room, with a contrast at every outline.
+    /// A dark object on a dark table in a bright room, with an edge at every outline.
     fn scene() -> (Vec<[f32; 5]>, Vec<f32>) {
         let kind = |x: usize, y: usize| match (x, y) {
             (15..25, 8..22) => 2,
@@ -150,7 +131,7 @@ mod tests {
             0 => [25.0, 1.0, 2.0, 9.0, 3.0],
             _ => [8.0, 0.2, 0.1, 3.0, 0.5],
         };
-        let contrast = |at: usize| {
+        let lasting = |at: usize| {
             let (x, y) = (at % 40, at / 40);
             let near = [
                 (x + 1, y),
@@ -161,18 +142,18 @@ mod tests {
             let differs = near
                 .iter()
                 .any(|&(i, j)| kind(i.min(39), j.min(29)) != kind(x, y));
-            if differs { 40.0 } else { 0.1 }
+            if differs { 1.0 } else { 0.1 }
         };
         (
             (0..1200).map(feature).collect(),
-            (0..1200).map(contrast).collect(),
+            (0..1200).map(lasting).collect(),
         )
     }
 
     #[test]
     fn the_table_is_found_and_the_dark_object_on_it_is_not() {
-        let (features, contrast) = scene();
-        let table = find_turntable(&features, &contrast, SIZE);
+        let (features, lasting) = scene();
+        let table = find_turntable(&features, &lasting, SIZE);
         let at = |x: usize, y: usize| table.surface.bits()[y * 40 + x];
         assert!(at(8, 24) && at(30, 28) && at(20, 27));
         assert!(!at(20, 12) && !at(20, 20) && !at(2, 2));
@@ -180,11 +161,11 @@ mod tests {
 
     #[test]
     fn without_a_table_nothing_is_found() {
-        let (features, contrast) = scene();
+        let (features, lasting) = scene();
         let bright: Vec<_> = features
             .iter()
             .map(|f| [f[0] + 20.0, f[1], f[2], f[3], f[4]])
             .collect();
-        assert_eq!(find_turntable(&bright, &contrast, SIZE).surface.count(), 0);
+        assert_eq!(find_turntable(&bright, &lasting, SIZE).surface.count(), 0);
     }
 }

@@ -8,7 +8,6 @@
 use crate::bitmap::{Bitmap, Connectivity};
 
 use super::disc::Disc;
-use super::enclosed_regions::enclosed;
 use super::pixel_series::PixelSeries;
 use super::subspace::Subspace;
 
@@ -51,18 +50,10 @@ const AS_BRIGHT: f32 = 2.5;
 /// And is more likely the table by at least this logarithm.
 const LIKELY: f32 = 1.0;
 
-/// The table in shade differs from its middle by at most so many spreads, and by at most so many from its pixels that
-/// are so many pixels away.
+/// What is like the unshaded table differs from its middle by at most so many spreads.
 const SAME: f32 = 1.2;
-const EVEN: f32 = 0.25;
-const EVEN_REACH: usize = 3;
-/// Its brightness is less likely the object's, as a logarithm.
+/// And its brightness is less likely the object's, as a logarithm.
 const NOT_OBJECT: f32 = -1.0;
-/// Smaller parts are not shade, as a share of the object, and parts that are at most twice so many pixels wide.
-const LEAST_SHADED: f64 = 0.02;
-const SHADED_WIDTH: usize = 2;
-/// Of what is around a part of the table that is in shade all the time, at least this share is in shade most of it.
-const NEXT_TO: f64 = 0.2;
 
 /// The logarithm of the distance is counted in bins of this width, from here on.
 const BIN: f32 = 0.25;
@@ -112,8 +103,6 @@ pub(crate) struct TableModel {
     pub(crate) on_disc: Bitmap,
     /// The pixels that are as bright as the unshaded table in their brightest frames, and the object is not.
     as_unshaded: Bitmap,
-    /// Pixels of the object that was found which are the table in shade.
-    shaded: Bitmap,
     /// The pixels that are about as bright as the unshaded table in the frames in which they are brightest.
     as_bright: Bitmap,
     /// Whether most of the object that was found is far brighter than the table.
@@ -159,7 +148,6 @@ impl TableModel {
             .collect();
         let as_bright = far.map(|at, _| off[at].abs() <= AS_BRIGHT);
         let as_unshaded = far.map(|at, _| off[at].abs() <= SAME && by_brightness[at] <= NOT_OBJECT);
-        let shaded = shaded(&off, &as_unshaded, seen.object);
         let both = course.ratios.iter().zip(&by_brightness);
         let ratio: Vec<f32> = both
             .map(|(course, brightness)| course + brightness.max(-AS_DARK))
@@ -185,7 +173,6 @@ impl TableModel {
         };
         let above = above_rim(&far, disc);
         let ratio = ratio.iter().enumerate().map(|(at, &ratio)| match () {
-            () if shaded.bits()[at] => -STRENGTH,
             () if on_disc.bits()[at] => ratio.clamp(-STRENGTH, STRENGTH),
             () if above.bits()[at] => 0.0,
             () => ratio.clamp(-STRENGTH, 0.0),
@@ -193,7 +180,6 @@ impl TableModel {
         Some(Self {
             ratio: ratio.collect(),
             as_unshaded,
-            shaded,
             by_course: course.ratios,
             on_disc,
             as_bright,
@@ -227,7 +213,6 @@ impl TableModel {
             on_disc: all(&self.on_disc),
             as_bright: all(&self.as_bright),
             as_unshaded: all(&self.as_unshaded),
-            shaded: all(&self.shaded),
             object_is_bright: self.object_is_bright,
             size: half,
         }
@@ -245,8 +230,7 @@ impl TableModel {
             .map(|at, alike| alike && self.by_course[at] < 0.0);
         SeenTable {
             as_bright: by_course.and(&self.alike(LIKELY)).and(&self.as_bright),
-            like: by_course.or(&self.shaded).or(&self.as_unshaded),
-            shaded: self.shaded.clone(),
+            like: by_course.or(&self.as_unshaded),
         }
     }
 }
@@ -258,8 +242,6 @@ pub(crate) struct SeenTable {
     pub(crate) like: Bitmap,
     /// Those that are so for sure by their course, and as bright as the unshaded table.
     pub(crate) as_bright: Bitmap,
-    /// Those that are in shade for most of the turn.
-    pub(crate) shaded: Bitmap,
 }
 
 /// What may be table.
@@ -371,44 +353,6 @@ impl LogRatios {
         let ratios = values.iter().map(ratio).collect();
         Some(Self { of_table, ratios })
     }
-}
-
-/// The parts of an object that are the table in a shade that lasts for most of the turn, as under a sun: even there,
-/// its brightest frames show it without shade. It is as bright then as the table everywhere, and evenly so, as one plane
-/// is. `off` is by how much each pixel is darker, in the table's spreads.
-fn shaded(off: &[f32], as_unshaded: &Bitmap, object: &Bitmap) -> Bitmap {
-    let width = object.width();
-    let reach = EVEN_REACH as isize;
-    let is_even = |at: usize| {
-        let near = [-reach, reach].map(|by| [by, by * width as isize]);
-        let near = near.iter().flatten();
-        let others = near.filter_map(|by| at.checked_add_signed(*by));
-        // Not those at the other end of the next row.
-        let mut others = others
-            .filter(|other| (other % width).abs_diff(at % width) <= EVEN_REACH)
-            .filter_map(|other| off.get(other));
-        others.all(|other| (other - off[at]).abs() <= EVEN)
-    };
-    let outline = object.or(&enclosed(object, width));
-    let least = (object.count() as f64 * LEAST_SHADED) as u64;
-    let shaded = outline
-        .and(as_unshaded)
-        .map(|at, bit| bit && is_even(at))
-        .opened(SHADED_WIDTH)
-        .parts_where(Connectivity::Eight, |part, _| part.area >= least);
-    if shaded.count() == 0 {
-        return shaded;
-    }
-    // What is in shade in all frames is darker, and next to it.
-    let darker = outline.map(|at, bit| bit && off[at] > 0.0).minus(&shaded);
-    let deep = darker
-        .opened(1)
-        .parts_where(Connectivity::Four, |_, pixels| {
-            let part = pixels();
-            let around = part.dilated(2 * EVEN_REACH).minus(&part);
-            around.share_in(&shaded) >= NEXT_TO
-        });
-    shaded.or(&deep)
 }
 
 /// The luminance of the unshaded table in each frame.
@@ -602,38 +546,6 @@ mod tests {
         let trend = Trend::learn(&values, &samples, 10);
         assert!((trend.at(5) - gleam(5)).abs() < 0.03);
         assert!((trend.at(495) - gleam(495)).abs() < 0.03);
-    }
-
-    #[test]
-    fn an_even_part_as_bright_as_the_table_is_its_shade_and_with_it_what_is_darker_there() {
-        let square = |at: usize, from: usize, to: usize| {
-            let (x, y) = (at % 60, at / 60);
-            (from..to).contains(&x) && (from..to).contains(&y)
-        };
-        let all = Bitmap::new((60, 60), std::iter::empty());
-        let object = all.map(|at, _| square(at, 3, 57));
-        let (shade, core) = (
-            |at: usize| square(at, 6, 54),
-            |at: usize| square(at, 26, 34),
-        );
-        let off = |uneven: bool| -> Vec<f32> {
-            let level = |at: usize| match () {
-                () if core(at) => 8.0,
-                () if shade(at) && uneven => 0.4 * (at % 7) as f32,
-                () if shade(at) => 0.1,
-                () => -20.0,
-            };
-            (0..3600).map(level).collect()
-        };
-        let as_unshaded = all.map(|at, _| shade(at) && !core(at));
-        let found = shaded(&off(false), &as_unshaded, &object);
-        // Between the two a pixel may show something of both.
-        let wanted = all.map(|at, _| core(at) || square(at, 10, 20));
-        assert_eq!(wanted.minus(&found).count(), 0);
-        assert_eq!(found.minus(&all.map(|at, _| shade(at))).count(), 0);
-        assert_eq!(shaded(&off(true), &as_unshaded, &object).count(), 0);
-        let none = object.minus(&object);
-        assert_eq!(shaded(&off(false), &none, &object).count(), 0);
     }
 
     #[test]
