@@ -15,6 +15,20 @@ pub(crate) enum TimingAnomaly {
         /// By how many periods the time grew.
         timed: i64,
     },
+    /// A stamp that is off by a period or more, while its neighbours are not.
+    #[error("the time stamp of frame {frame} is off by {off} frames")]
+    OddTime {
+        /// The frame.
+        frame: usize,
+        /// By how many periods; positive where it is late.
+        off: i64,
+    },
+    /// Two frames in one period, without a counter that distinguishes them.
+    #[error("frame {frame} comes within the same period as the one before")]
+    SamePeriod {
+        /// The second of both.
+        frame: usize,
+    },
     /// Frames cannot be counted by their time stamps.
     #[error("the time stamps are too irregular to count frames by")]
     Irregular,
@@ -32,8 +46,13 @@ impl TimingAnomaly {
     /// The same with frames counted from frame `first` on; `None` if it is about a frame before
     /// that one, or about one of `frames` frames later or more.
     pub(crate) fn counted_from(mut self, first: usize, frames: usize) -> Option<Self> {
-        if let Self::Contradiction { before: at, .. } = &mut self {
-            *at = at.checked_sub(first).filter(|&at| at < frames)?;
+        match &mut self {
+            Self::Contradiction { before: at, .. }
+            | Self::OddTime { frame: at, .. }
+            | Self::SamePeriod { frame: at } => {
+                *at = at.checked_sub(first).filter(|&at| at < frames)?;
+            }
+            Self::Irregular | Self::Rate { .. } => {}
         }
         Some(self)
     }

@@ -6,7 +6,7 @@
 //! through the stamps confirms it. Where it does not (some drivers repeat numbers, or never count),
 //! or where line and stamps differ, `p` and `a` are found from the stamps alone (`period_fit.rs`).
 //!
-//! Where both disagree, the stamps decide what is missing, since a frame's angle follows
+//! Where both disagree for good, the stamps decide what is missing, since a frame's angle follows
 //! from its time, and the contradiction is reported.
 
 mod anomaly;

@@ -196,11 +196,15 @@ fn a_counter_that_starts_anew_is_reported_and_loses_nothing() {
 }
 
 #[test]
-fn a_single_late_stamp_is_no_gap() {
+fn a_single_late_stamp_is_reported_and_is_no_gap() {
     let mut stamps = regular(300);
     stamps[150].t_us += 36_000;
     let timing = FrameTiming::from_stamps(&stamps, 30.0);
     assert_eq!(missing(&timing), 0);
+    assert_eq!(
+        timing.anomalies,
+        [TimingAnomaly::OddTime { frame: 150, off: 1 }]
+    );
 }
 
 #[test]
