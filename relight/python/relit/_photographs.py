@@ -42,7 +42,7 @@ class Decomposition:
     shading: numpy.ndarray
     #: rows x columns, float32, linear, from 0, in the photograph's units; 0 where no highlight was separated.
     highlight: numpy.ndarray
-    #: rows x columns, float32, 0 to 1: the network's certainty whether a dark pixel is paint or shadow.
+    #: rows x columns, float32, 0 to 1: how certain it is whether a dark pixel is paint or shadow, by the maps.
     #: Where it is low, albedo and shading may be wrong by the same factor.
     confidence: numpy.ndarray
     #: rows x columns, bool: the object.

@@ -230,7 +230,7 @@ impl RelightableObject {
     /// ```
     ///
     /// where t and u are the confidence in the decomposition. For a photograph t is 0.6. u is 0.2 where it is dark (S up to
-    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain how much of the dark is paint, and
+    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where it is certain how much of the dark is paint, and
     /// as much less where it is uncertain; in the light of a lamp alone it is at least 0.8. For a captured object both are 1. So
     /// relief and fine texture stay, shadows stay as far as the light comes from the same directions, brightness changes only as
     /// far as the confidence allows, and the photograph's own light gives the photograph.

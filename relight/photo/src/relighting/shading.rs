@@ -219,7 +219,8 @@ mod tests {
         let shading = Planes::from_fn(extent, |x, _| [if x < SIDE / 2 { 0.1 } else { 1.0 }]);
         let own = Planes::filled(extent, [1.0; 3]);
         let wanted = vec![true; SIDE * SIDE];
-        Shading::new(&shading, &own, &wanted).doubted(None, &wanted)
+        let paint = Planes::filled(extent, [0.25]);
+        Shading::new(&shading, &own, &wanted).doubted(&paint, &wanted)
     }
 
     /// The shading of a place in light of the same strength from elsewhere.
@@ -246,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_change_is_believed_less_where_the_photograph_is_dark() {
-        let trust = |seen: f32| kept_beside(seen.ln(), None);
+        let trust = |seen: f32| kept_beside(seen.ln(), 0.25);
         assert!((trust(0.0) - 0.2).abs() < 1e-6);
         assert!((trust(1.05) - 0.8).abs() < 1e-6);
         assert!((0.4..0.7).contains(&trust(0.35)));

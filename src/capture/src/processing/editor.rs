@@ -1,7 +1,7 @@
 //! The editor of masks, for one session at a time. While the rig is busy it takes no requests.
 
 use std::fmt;
-use std::sync::{MutexGuard, PoisonError};
+use std::sync::{MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -35,7 +35,7 @@ impl fmt::Debug for OpenEditor {
 
 impl OpenEditor {
     fn is_in_use(&self) -> bool {
-        self.used.elapsed() < IN_USE
+        self.editor.is_working() || self.used.elapsed() < IN_USE
     }
 }
 
@@ -53,7 +53,11 @@ impl Processing {
             let error = format!("{session} is being processed: wait for it, or cancel it");
             return Err(CommandError::Busy(error));
         }
-        let _opening = shared.opening.lock();
+        let opening = shared.opening.try_lock();
+        if let Err(TryLockError::WouldBlock) = opening {
+            let error = "a mask is being opened in the editor: try again in a moment";
+            return Err(CommandError::Busy(error.to_owned()));
+        }
         if !shared.goes_on(session)? {
             let editor = shared.open_editor(session).map_err(|error| {
                 let why = with_causes(&error);

@@ -2,7 +2,8 @@
 //! relit-extract where they are installed; and the editor of masks.
 //!
 //! The `queue` decides what is done when, `results` says what a program made. One thread starts each `program`. While
-//! the rig captures or moves nothing begins, and what runs is stopped (`SIGSTOP`) until the rig rests. Results lie where
+//! the rig captures or moves nothing begins, and a program that runs is stopped (`SIGSTOP`) until the rig rests; what the
+//! editor began is finished at low priority. Results lie where
 //! the programs leave them, in the session and the data set; only the settings are kept (`store`) here.
 
 mod commands;

@@ -50,8 +50,14 @@ pub(super) async fn open(
 /// Without a mask: what was drawn is lost.
 pub(super) async fn close(
     State(processing): State<ProcessingHandle>,
+    State(permits): State<Arc<Permits>>,
 ) -> Result<StatusCode, Failure> {
-    present(processing)?.close_editor();
+    let processing = present(processing)?;
+    let closed = permits.run(Work::Command, move || {
+        processing.close_editor();
+        Ok(())
+    });
+    closed.await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

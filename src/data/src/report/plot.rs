@@ -35,14 +35,16 @@ impl Plot<'_> {
     /// The plot as one `<svg>` element.
     pub(super) fn svg(&self) -> String {
         let total = TOP + self.height + BELOW;
-        let lines: String = self.series.iter().map(|line| self.polyline(line)).collect();
+        let top = self.top();
+        let lines = self.series.iter().map(|line| self.polyline(line, top));
+        let lines: String = lines.collect();
         format!(
             "<svg viewBox=\"0 0 600 {total}\" role=\"img\" aria-label=\"{}\">\n{}{}{}{lines}</svg>\n",
             self.alternative,
             self.gate
-                .map(|gate| self.gate_line(gate))
+                .map(|gate| self.gate_line(gate, top))
                 .unwrap_or_default(),
-            self.ordinate(),
+            self.ordinate(top),
             self.abscissa_axis(),
         )
     }
@@ -55,13 +57,13 @@ impl Plot<'_> {
         if largest > 1e-6 { largest } else { 1.0 }
     }
 
-    fn y(&self, value: f64) -> String {
-        number(TOP + self.height * (1.0 - value / self.top()), 1)
+    fn y(&self, value: f64, top: f64) -> String {
+        number(TOP + self.height * (1.0 - value / top), 1)
     }
 
     /// The gate's label is in the margin, where no line crosses it.
-    fn gate_line(&self, gate: f64) -> String {
-        let y = self.y(100.0 * gate);
+    fn gate_line(&self, gate: f64, top: f64) -> String {
+        let y = self.y(100.0 * gate, top);
         format!(
             "<path class=\"tint\" d=\"M{LEFT} {TOP}H{RIGHT}V{y}H{LEFT}Z\"/>\
              <path class=\"gate\" d=\"M{LEFT} {y}H{RIGHT}\"/>\
@@ -72,11 +74,12 @@ impl Plot<'_> {
     }
 
     /// The quantity, with grid lines at zero, half way and the top.
-    fn ordinate(&self) -> String {
+    fn ordinate(&self, top: f64) -> String {
         let title = format!("<text x=\"0\" y=\"14\">{}</text>\n", self.quantity);
-        let top = self.top();
+        // Four digits, of which the last are mostly zeros and go.
+        let decimals = (3.0 - top.log10().floor()).clamp(0.0, 8.0) as usize;
         let ticks = [0.0, top / 2.0, top].map(|value| {
-            let (y, label) = (self.y(value), number(value, if top < 10.0 { 2 } else { 0 }));
+            let (y, label) = (self.y(value, top), number(value, decimals));
             format!(
                 "<path class=\"grid\" d=\"M{LEFT} {y}H{RIGHT}\"/>\
                  <text class=\"ordinate\" x=\"{}\" y=\"{y}\">{label}</text>\n",
@@ -104,9 +107,10 @@ impl Plot<'_> {
             )
     }
 
-    fn polyline(&self, (class, points): &Series) -> String {
-        let at =
-            |&(angle, value): &(f64, f64)| format!("{},{}", number(x(angle), 1), self.y(value));
+    fn polyline(&self, (class, points): &Series, top: f64) -> String {
+        let at = |&(angle, value): &(f64, f64)| {
+            format!("{},{}", number(x(angle), 1), self.y(value, top))
+        };
         let mut points: Vec<String> = points.iter().map(at).collect();
         // A line of one point would not be drawn; a line from a point to itself is a dot.
         if let [only] = points.as_slice() {
@@ -127,22 +131,21 @@ fn x(angle: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn svg(points: Vec<(f64, f64)>) -> String {
-        let plot = Plot {
+    fn plot(points: Vec<(f64, f64)>) -> Plot<'static> {
+        Plot {
             alternative: "",
             quantity: "q",
             abscissa: "a",
             height: 200.0,
             series: vec![("c", points)],
             gate: Some(0.05),
-        };
-        plot.svg()
+        }
     }
 
     #[test]
     fn the_gate_is_drawn_at_its_height() {
         // The axis reaches 10 %, so 5 % is half way up a plot of 200 units.
-        let svg = svg(vec![(0.0, 1.0), (360.0, 9.0)]);
+        let svg = plot(vec![(0.0, 1.0), (360.0, 9.0)]).svg();
         assert!(
             svg.contains("<path class=\"gate\" d=\"M54 130H554\"/>"),
             "{svg}"
@@ -154,8 +157,19 @@ mod tests {
     }
 
     #[test]
+    fn a_small_range_has_labels_that_differ() {
+        let plot = Plot {
+            gate: None,
+            series: vec![("c", vec![(0.0, 0.003), (360.0, 0.001)])],
+            ..plot(Vec::new())
+        };
+        let svg = plot.svg();
+        assert!(svg.contains(">0.003<") && svg.contains(">0.0015<"), "{svg}");
+    }
+
+    #[test]
     fn a_single_point_is_drawn_as_a_dot() {
-        let svg = svg(vec![(180.0, 0.0)]);
+        let svg = plot(vec![(180.0, 0.0)]).svg();
         assert!(svg.contains("points=\"304,230 304,230\""), "{svg}");
     }
 }

@@ -2,8 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use axum::extract::{FromRef, Path, State};
+use axum::extract::{FromRef, Path, Request, State};
 use axum::http::{StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
@@ -93,14 +94,36 @@ pub(super) fn router(app: App) -> Router {
     }
     router
         .fallback(async || Failure::not_found("there is nothing at this path"))
+        .layer(from_fn_with_state(app.clone(), of_this_recording))
         .with_state(app)
+}
+
+#[derive(Deserialize)]
+struct Of {
+    of: Option<String>,
+}
+
+/// Refuses what a page of another recording asks: the address may be the same.
+async fn of_this_recording(
+    State(session): State<Arc<EditorSession>>,
+    QueryParams(Of { of }): QueryParams<Of>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Failure> {
+    if of.is_some_and(|of| of != session.recording()) {
+        let error = "another recording is open in the editor now: open this one again";
+        return Err(Failure::new(StatusCode::CONFLICT, error.to_owned()));
+    }
+    Ok(next.run(request).await)
 }
 
 fn failure(error: MaskingError) -> Failure {
     let status = match &error {
         MaskingError::Mask(_) => StatusCode::UNPROCESSABLE_ENTITY,
         MaskingError::Video(VideoError::NoSuchFrame { .. }) => StatusCode::NOT_FOUND,
-        MaskingError::Handmade(_) | MaskingError::ForeignFile { .. } => StatusCode::CONFLICT,
+        MaskingError::Handmade(_) | MaskingError::ForeignFile { .. } | MaskingError::Refused(_) => {
+            StatusCode::CONFLICT
+        }
         _ => StatusCode::INTERNAL_SERVER_ERROR,
     };
     Failure::new(status, with_causes(&error))
@@ -161,7 +184,9 @@ async fn accept(
     State(app): State<App>,
     JsonBody(sketch): JsonBody<Sketch>,
 ) -> Result<Json<Value>, Failure> {
-    let record = app.work(move |session| session.write(sketch)).await?;
+    let over = app.over.clone();
+    let write = move |session: &EditorSession| session.write(sketch, || over.is_cancelled());
+    let record = app.work(write).await?;
     let accepted = json!({
         "area_px": record.result.statistics.area_px,
         "mask_blake3": record.result.mask_blake3,

@@ -83,6 +83,11 @@ impl MaskEditor {
         api::router(self.app.clone())
     }
 
+    /// Whether a request is under way.
+    pub fn is_working(&self) -> bool {
+        self.app.permits.available_permits() < AT_ONCE
+    }
+
     /// Whether the mask was accepted or discarded.
     pub fn is_over(&self) -> bool {
         self.app.over.is_cancelled()
@@ -98,6 +103,13 @@ impl MaskEditor {
             record,
             notices: self.notices.clone(),
         })
+    }
+}
+
+impl Drop for MaskEditor {
+    /// What is being cut then is not written.
+    fn drop(&mut self) {
+        self.app.over.cancel();
     }
 }
 

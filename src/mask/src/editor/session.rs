@@ -69,6 +69,11 @@ impl EditorSession {
         Ok(session)
     }
 
+    /// The name of the recording.
+    pub(super) fn recording(&self) -> &str {
+        &self.recording
+    }
+
     /// What the page has to know at its start.
     pub(super) fn description(&self) -> Value {
         let facts = self.video.facts();
@@ -118,12 +123,20 @@ impl EditorSession {
         Ok(mask)
     }
 
-    /// Makes the mask of a sketch and writes its files.
-    pub(super) fn write(&self, sketch: Sketch) -> Result<MaskRecord, MaskingError> {
+    /// Makes the mask of a sketch and writes its files, unless the editor is over by then.
+    pub(super) fn write(
+        &self,
+        sketch: Sketch,
+        is_over: impl Fn() -> bool,
+    ) -> Result<MaskRecord, MaskingError> {
         let frame = self.frame(sketch.frame)?;
         let turn = self.turn(&sketch)?;
         let request = self.request_of(sketch);
         let (mask, request) = cut(&frame.picture, turn.as_deref(), &request, Effort::Fine)?;
+        if is_over() {
+            let why = "the editor was closed: no mask is written";
+            return Err(MaskingError::Refused(why.to_owned()));
+        }
         let _made = make_folder(&self.files)?;
         // Somebody may have painted one meanwhile.
         check_replaceable(&self.files, request.force)?;

@@ -19,11 +19,13 @@ let made = null;
 /** Whether the page is served by another program under a path of its own: the rig, which takes over again at the end. */
 const within = location.pathname !== "/";
 
-/** Asks the program; throws an Error with its sentence, and `held` where it may answer later. */
+/** Asks for the recording that the page shows, so that an editor of another one answers nothing; throws an Error with its sentence, and `held` where it may answer later. */
 async function request(path, options = {}) {
+  const url = new URL(path, document.baseURI);
+  if (about) url.searchParams.set("of", about.recording);
   let response;
   try {
-    response = await fetch(path, options);
+    response = await fetch(url, options);
   } catch {
     throw new Error("The program does not answer: has it ended?");
   }
