@@ -557,6 +557,9 @@ fn the_editor_is_reached_through_the_rig_by_those_whom_the_rig_lets_in() {
     let picture = serving.get("/edit/api/v1/frames/0?width=64");
     assert_eq!(picture.header("content-type"), Some("image/jpeg"));
     assert!(picture.header("content-security-policy").is_some());
+    let of = |session: &str| serving.get(&format!("/edit/api/v1/recording?of={session}"));
+    assert_eq!(of(COW).status, 200);
+    assert_eq!(of(BUST).status, 409, "a page of the session before");
     let sketch = json!({ "frame": 0, "auto": false, "rect": [170, 20, 300, 300], "strokes": [] });
     let post = |path: &str, header: &str| {
         let headers = ["Content-Type: application/json", header];
