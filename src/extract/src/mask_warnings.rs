@@ -21,8 +21,8 @@ const FRAMES: usize = 12;
 const MAX_PIXELS: u64 = 310_000;
 /// A mask is that of something else where its outline follows what moves less than so well, compared with the turn's
 /// own, and so much of its area is wrong.
-const OTHER_OUTLINE: f32 = 0.5;
-const OTHER_AREA: f64 = 0.2;
+const OTHER_OUTLINE: f32 = 0.6;
+const OTHER_AREA: f64 = 0.15;
 
 /// One sentence for each thing that is worth a warning about a mask, and how much the mask does not fit.
 type MaskWarnings = (Vec<String>, Option<MaskMisfit>);
