@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_worker_that_panics_ends_the_program() {
-        let (tell, told) = std::sync::mpsc::channel();
+        let (tell, told) = std::sync::mpsc::sync_channel(1);
         let failed = move || tell.send(()).unwrap();
         let work = || resume_unwind(Box::new(()));
         let worker = spawn(&Clock::virtual_time(), failed, work).unwrap();
