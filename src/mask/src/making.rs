@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use image::RgbImage;
+use relit_data::durable::CreatedFolder;
 use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_grabcut::{Effort, Mask, grey_png, preview, rgb_png, segment_on_plain, segment_with};
 use relit_video::Video;
@@ -43,22 +44,57 @@ pub fn make_mask(
     output: Option<MaskFiles>,
     request: &MaskRequest,
 ) -> Result<MaskOutput, MaskingError> {
-    let recording = Recording::open(input)?;
-    let files = files_of(&recording, output)?;
-    let _made = make_folder(&files)?;
-    check_replaceable(&files, request.force)?;
-    let video = Video::open(&recording.video)?;
-    if !request.force {
-        check_same_input(&files, &recording, &video)?;
-    }
-    let (request, notice) = with_strokes(request, &files, &video)?;
-    let record = segment_and_write(&video, &files, &request)?;
+    let prepared = Prepared::new(input, output, request)?;
+    let record = segment_and_write(&prepared.video, &prepared.files, &prepared.request)?;
     Ok(MaskOutput {
-        recording: recording.id,
-        files,
+        recording: prepared.recording.id,
+        files: prepared.files,
         record,
-        notices: recording.notices.into_iter().chain(notice).collect(),
+        notices: prepared.notices,
     })
+}
+
+/// A recording whose mask can be made: nothing in the place of its files forbids it.
+pub(super) struct Prepared<'a> {
+    pub(super) recording: Recording,
+    pub(super) video: Video,
+    pub(super) files: MaskFiles,
+    /// With the strokes of the mask that is replaced.
+    pub(super) request: Cow<'a, MaskRequest>,
+    pub(super) notices: Vec<Notice>,
+    /// Takes away the folder of the files, if it was made for them and stays empty.
+    _made: CreatedFolder,
+}
+
+impl<'a> Prepared<'a> {
+    /// Opens the recording, and finds the place of its mask.
+    ///
+    /// # Errors
+    /// As [`make_mask`].
+    pub(super) fn new(
+        input: &Path,
+        output: Option<MaskFiles>,
+        request: &'a MaskRequest,
+    ) -> Result<Self, MaskingError> {
+        let mut recording = Recording::open(input)?;
+        let files = files_of(&recording, output)?;
+        let made = make_folder(&files)?;
+        check_replaceable(&files, request.force)?;
+        let video = Video::open(&recording.video)?;
+        if !request.force {
+            check_same_input(&files, &recording, &video)?;
+        }
+        let (request, notice) = with_strokes(request, &files, &video)?;
+        let notices = std::mem::take(&mut recording.notices);
+        Ok(Self {
+            recording,
+            video,
+            files,
+            request,
+            notices: notices.into_iter().chain(notice).collect(),
+            _made: made,
+        })
+    }
 }
 
 fn segment_and_write(
@@ -147,10 +183,7 @@ pub(super) fn write_files(
 
 /// The files of a recording's mask: those that are requested, or `mask.png` in the session folder or, for
 /// a bare video, in the working directory.
-pub(super) fn files_of(
-    recording: &Recording,
-    output: Option<MaskFiles>,
-) -> Result<MaskFiles, MaskingError> {
+fn files_of(recording: &Recording, output: Option<MaskFiles>) -> Result<MaskFiles, MaskingError> {
     match output {
         Some(files) => Ok(files),
         None => {

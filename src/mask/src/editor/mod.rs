@@ -16,14 +16,11 @@ use axum::Router;
 use axum::extract::FromRef;
 use axum::middleware::from_fn_with_state;
 use axum::routing::get;
-use relit_data::session::{Notice, Recording};
-use relit_video::Video;
+use relit_data::session::Notice;
 use relit_web::{AccessPolicy, Announcement, IndexPage, Shutdown, Token, guard, index, serve_page};
 use tokio::sync::Semaphore;
 
-use super::earlier::{check_same_input, with_strokes};
-use super::files::{check_replaceable, make_folder};
-use super::making::files_of;
+use super::making::Prepared;
 use super::{MaskFiles, MaskOutput, MaskRequest, MaskingError};
 use api::App;
 use session::EditorSession;
@@ -54,21 +51,20 @@ impl MaskEditor {
         output: Option<MaskFiles>,
         request: &MaskRequest,
     ) -> Result<Self, MaskingError> {
-        let recording = Recording::open(input)?;
-        let files = files_of(&recording, output)?;
-        let _made = make_folder(&files)?;
-        check_replaceable(&files, request.force)?;
-        let video = Video::open(&recording.video)?;
-        if !request.force {
-            check_same_input(&files, &recording, &video)?;
-        }
-        let (request, notice) = with_strokes(request, &files, &video)?;
+        let Prepared {
+            recording,
+            video,
+            files,
+            request,
+            notices,
+            ..
+        } = Prepared::new(input, output, request)?;
         let request = request.into_owned();
         let session = EditorSession::new(&recording, video, files.clone(), request)?;
         Ok(Self {
             recording: recording.id,
             files,
-            notices: recording.notices.into_iter().chain(notice).collect(),
+            notices,
             app: App {
                 session: Arc::new(session),
                 over: Shutdown::new(),
