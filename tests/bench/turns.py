@@ -1,0 +1,490 @@
+"""Rendered turns of objects that are hard to cut out, with ground truth, and how `relit-mask --auto` and its check do.
+
+    python turns.py make MESHES PANORAMAS FOLDER --count 20 --seed 1000
+    python turns.py measure relit-mask FOLDER
+
+MESHES holds `.obj` and archives of Sweet Home 3D (`.sh3f`), PANORAMAS `.hdr`. The kinds take turns: objects with openings,
+black ones, white ones, and objects before a white room. A third are built of bars, boxes and rings. They stand on a black,
+slightly glossy disc, lit by a panorama through a light transport of 360 directions (shadows, and the object's light
+on the table). FOLDER/NUMBER-KIND-OBJECT gets `video.mkv` (Motion JPEG, one turn) and `mask_gt.png`, an antialiased mask.
+`ffmpeg` writes the videos.
+"""
+
+import argparse
+import pathlib
+import re
+import subprocess
+import tempfile
+import zipfile
+
+import cv2
+import numpy as np
+
+WIDTH, HEIGHT, FINE = 640, 480, 2
+FRAMES = 150
+DIRECTIONS = 360
+KINDS = ["openings", "black", "white-room", "white"]
+BUILT = ["chair", "rack", "mug", "rings", "basket", "lamp", "arch"]
+OPEN = re.compile("chair|stool|shelf|rack|bike|cart|ladder|basket|table|lamp|wheel", re.I)
+ROOM, TABLE, OBJECT = range(3)
+
+
+def obj(lines):
+    """Vertices, triangles, and the number of each triangle's material."""
+    vertices, faces, names, parts = [], [], {}, []
+    for line in lines:
+        word, *rest = line.split() or [""]
+        if word == "v":
+            vertices.append([float(number) for number in rest[:3]])
+        elif word == "usemtl":
+            names.setdefault(line, len(names))
+            part = names[line]
+        elif word == "f":
+            at = [int(corner.split("/")[0]) for corner in rest]
+            at = [corner - 1 if corner > 0 else len(vertices) + corner for corner in at]
+            faces += [[at[0], at[k], at[k + 1]] for k in range(1, len(at) - 1)]
+            parts += [part if names else 0] * (len(at) - 2)
+    return np.array(vertices), np.array(faces, int).reshape(-1, 3), np.array(parts, int)
+
+
+def sources(folder):
+    """The names of all objects, each with a function that reads it."""
+    found = {path.stem: lambda path=path: obj(path.read_text().splitlines()) for path in sorted(folder.rglob("*.obj"))}
+    for path in sorted(folder.rglob("*.sh3f")):
+        with zipfile.ZipFile(path) as archive:
+            names = [name for name in archive.namelist() if name.endswith(".obj") and OPEN.search(name)]
+
+        def read(path=path, name=None):
+            with zipfile.ZipFile(path) as archive:
+                return obj(archive.read(name).decode("latin-1").splitlines())
+
+        for name in sorted(names):
+            found[pathlib.Path(name).stem] = lambda read=read, name=name: read(name=name)
+    return found
+
+
+def grid(points, part):
+    """A closed surface through rows of points that close in themselves."""
+    rows, columns = points.shape[:2]
+    at = np.arange(rows * columns).reshape(rows, columns)
+    right, down = np.roll(at, -1, 1), np.roll(at, -1, 0)
+    corners = np.stack([at, right, np.roll(right, -1, 0), down], -1)[:-1].reshape(-1, 4)
+    faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    return points.reshape(-1, 3), faces, np.full(len(faces), part)
+
+
+def tube(path, radius, part, sides=14):
+    """A tube along points."""
+    path = np.array(path, float)
+    along = np.gradient(path, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    side = np.cross(along, [0.31, 0.17, 0.93])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)[None, :, None]
+    rings = path[:, None] + radius * (np.cos(angle) * side[:, None] + np.sin(angle) * np.cross(along, side)[:, None])
+    ends = [np.repeat(path[k][None, None], sides, 1) for k in (0, -1)]
+    return grid(np.concatenate([ends[0], rings, ends[1]]), part)
+
+
+def ring(middle, radius, thick, part, upright=None):
+    """A torus, lying, or upright and turned by an angle; as a tube."""
+    turn = np.linspace(0, 2 * np.pi, 49)
+    flat = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], 1)
+    if upright is not None:
+        flat = np.stack([np.cos(turn) * np.cos(upright), np.sin(turn), np.cos(turn) * np.sin(upright)], 1)
+    return tube(np.array(middle) + radius * flat, thick, part)
+
+
+def box(low, high, part):
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    places = (np.array(low) + corners * (np.array(high) - low))[quads].reshape(-1, 3)
+    at = np.arange(24).reshape(6, 4)
+    return places, np.concatenate([at[:, [0, 1, 2]], at[:, [0, 2, 3]]]), np.full(12, part)
+
+
+def turned(profile, part, sides=48):
+    """A solid of revolution of points (radius, height)."""
+    angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    profile = np.array(profile, float)
+    points = np.stack([np.outer(profile[:, 0], np.cos(angle)), np.outer(profile[:, 1], np.ones(sides)), np.outer(profile[:, 0], np.sin(angle))], -1)
+    return grid(points, part)
+
+
+def built(kind, rng):
+    """Parts of an object of bars, boxes and rings, that stands on y = 0."""
+    w, d, h, t = rng.uniform(0.35, 0.6), rng.uniform(0.3, 0.5), rng.uniform(0.9, 1.5), rng.uniform(0.025, 0.06)
+    legs = [(x * w, z * d) for x in (-1, 1) for z in (-1, 1)]
+    if kind == "chair":
+        parts = [tube([[x, 0, z], [x, h / 2, z]], t, 0) for x, z in legs]
+        parts += [box([-w - t, h / 2, -d - t], [w + t, h / 2 + 1.5 * t, d + t], 1)]
+        parts += [tube([[x, h / 2, -d], [x * 1.05, h, -d * 1.2]], t, 0) for x in np.linspace(-w, w, rng.integers(3, 6))]
+        parts += [tube([[-w * 1.1, h, -d * 1.2], [w * 1.1, h, -d * 1.2]], t, 0)]
+    elif kind == "rack":
+        parts = [tube([[x, 0, z], [x, h, z]], t, 0) for x, z in legs]
+        parts += [box([-w, y, -d], [w, y + t, d], 1) for y in np.linspace(0.12, 0.95, rng.integers(2, 5)) * h]
+    elif kind == "mug":
+        r = 0.75 * w
+        parts = [turned([[0, 0], [r, 0], [r, h], [0.9 * r, h], [0.85 * r, 0.06], [0, 0.06]], 0)]
+        parts += [ring([r, h / 2, 0], h * rng.uniform(0.26, 0.36), 1.2 * t, 1, 0)]
+    elif kind == "rings":
+        parts = [ring([0, 0.45 * h, 0], 0.45 * h - t, t, k % 2, angle) for k, angle in enumerate(rng.uniform(0, 3.14, rng.integers(1, 4)))]
+        parts += [turned([[0, 0], [w * 0.6, 0], [w * 0.6, t], [0, 1.5 * t]], 1)]
+    elif kind == "basket":
+        parts = [ring([0, y * h * 0.6, 0], w * (0.8 + 0.3 * y), t * 0.8, 1) for y in (0.07, 0.5, 1)]
+        turns = np.linspace(0, 6.28, rng.integers(9, 16))[:-1]
+        foot = [np.array([np.cos(a), 0, np.sin(a)]) * w for a in turns]
+        parts += [tube([0.8 * p, 1.1 * p + [0, h * 0.6, 0]], t * 0.7, 0) for p in foot]
+        parts += [turned([[0, 0], [0.8 * w, 0], [0.8 * w, t], [0, t]], 0)] + [ring([0, h * 0.6, 0], 1.1 * w, t * 0.7, 0, rng.uniform(0, 3))]
+    elif kind == "lamp":
+        elbow, head = [-w * 0.9, h * 0.6, 0], [w * 0.7, h, d * 0.5]
+        parts = [turned([[0, 0], [w * 0.7, 0], [w * 0.6, 0.08], [0, 0.1]], 1), tube([[0, 0.05, 0], elbow], t, 0), tube([elbow, head], t, 0)]
+        shade = turned([[0, 0.3], [0.1, 0.3], [0.35, 0], [0.33, 0], [0, 0.26]], 1)
+        parts += [(shade[0] + head - [0, 0.25, 0], *shade[1:])]
+    else:
+        parts = [box([-w, 0, -d], [-w + 5 * t, h, d], 0), box([w - 5 * t, 0, -d], [w, h, d], 0), box([-w, h, -d], [w, h + 4 * t, d], 1)]
+        parts += [turned([[0, h + 4 * t], [w / 2, h + 4 * t], [w / 2, h + 8 * t], [0, h + 8 * t]], 0)] * (rng.random() < 0.5)
+    vertices = np.concatenate([part[0] for part in parts])
+    offsets = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
+    faces = np.concatenate([part[1] + offset for part, offset in zip(parts, offsets)])
+    return vertices, faces, np.concatenate([part[2] for part in parts])
+
+
+def unit(vectors):
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def normals(vertices, faces):
+    """Each triangle's normal, and those of its corners, smooth but for creases."""
+    edges = vertices[faces[:, 1:]] - vertices[faces[:, :1]]
+    of_face = np.cross(edges[:, 0], edges[:, 1])
+    smooth = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(smooth, faces[:, corner], of_face)
+    of_face, smooth = unit(of_face)[:, None], unit(smooth)[faces]
+    return of_face[:, 0], np.where((smooth * of_face).sum(-1, keepdims=True) < 0.7, of_face, smooth)
+
+
+def raster(places, faces, size):
+    """Of each pixel the nearest triangle (-1 for none) and its barycentric coordinates; places are x, y, 1/depth."""
+    width, height = size
+    corners = places[faces]
+    low = np.clip(np.floor(corners[..., :2].min(1)), 0, [width, height]).astype(int)
+    high = np.clip(np.ceil(corners[..., :2].max(1)) + 1, 0, [width, height]).astype(int)
+    many = np.prod(np.maximum(high - low, 0), 1)
+    a, b, c = (corners[:, k] for k in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    depth, shown = np.full(width * height, -np.inf), np.full(width * height, -1)
+    shares = np.zeros((width * height, 3))
+    todo = np.flatnonzero((many > 0) & (np.abs(area) > 1e-9))
+    for some in np.split(todo, np.searchsorted(np.cumsum(many[todo]), np.arange(3_000_000, many[todo].sum(), 3_000_000))):
+        at = np.repeat(some, many[some])
+        number = np.arange(len(at)) - np.repeat(np.cumsum(many[some]) - many[some], many[some])
+        columns = (high - low)[at, 0]
+        x, y = low[at, 0] + number % columns, low[at, 1] + number // columns
+        u, v = x + 0.5, y + 0.5
+        cross = lambda p, q: ((q[at, 0] - p[at, 0]) * (v - p[at, 1]) - (q[at, 1] - p[at, 1]) * (u - p[at, 0])) / area[at]
+        share = np.stack([cross(b, c), cross(c, a), cross(a, b)], 1)
+        inside = (share >= 0).all(1)
+        at, pixel, share = at[inside], (y * width + x)[inside], share[inside]
+        near = (share * corners[at, :, 2]).sum(1)
+        np.maximum.at(depth, pixel, near)
+        wins = near >= depth[pixel]
+        shown[pixel[wins]], shares[pixel[wins]] = at[wins], share[wins]
+    return shown, shares
+
+
+def directions():
+    k = np.arange(DIRECTIONS) + 0.5
+    y, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
+    return np.stack([np.sqrt(1 - y * y) * np.cos(turn), y, np.sqrt(1 - y * y) * np.sin(turn)], 1)
+
+
+def visible(points, to, surface, disc, cells=220):
+    """Which of some points see the sky in a direction: a depth map of points of the surface, and the disc."""
+    side = np.cross(to, [0.3, 0.2, 0.9])
+    side /= np.linalg.norm(side)
+    axes = np.stack([side, np.cross(to, side), to], 1).astype(np.float32)
+    scale = cells / 4.6
+    seen, own = surface @ axes, points @ axes
+    cell = lambda at: (np.clip(at[:, :2] * scale + cells / 2, 0, cells - 1)).astype(int) @ [cells, 1]
+    nearest = np.full(cells * cells, -np.inf, np.float32)
+    np.maximum.at(nearest, cell(seen), seen[:, 2])
+    free = own[:, 2] > nearest[cell(own)] - 2.5 / scale
+    if to[1] < 0:
+        hit = points - to * (points[:, 1] / to[1])[:, None]
+        free &= np.hypot(hit[:, 0], hit[:, 2]) > disc
+    return free
+
+
+def sampled(panorama, at, turn):
+    """The panorama's light in directions, after the room turned by an angle."""
+    height, width = panorama.shape[:2]
+    u = ((np.arctan2(at[..., 2], at[..., 0]) + turn) / (2 * np.pi) % 1) * width
+    v = (np.arccos(np.clip(at[..., 1], -1, 1)) / np.pi * height - 0.5).clip(0, height - 1)
+    padded = np.concatenate([panorama, panorama[:, :1]], 1)
+    places = (place.reshape(len(at), -1).astype(np.float32) for place in (u, v))
+    return cv2.remap(padded, *places, cv2.INTER_LINEAR)
+
+
+def read_panorama(path, kind, rng):
+    light = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., :3].astype(np.float32)
+    light = np.minimum(cv2.resize(light, (1024, 512), interpolation=cv2.INTER_AREA), 3000)
+    light /= light[100:412].mean()
+    if "white" in kind and (kind == "white-room" or rng.random() < 0.5):
+        # Walls of one brightness, and some of the panorama's light on the object.
+        walls = rng.uniform(0.95, 1.05, 3).astype(np.float32)
+        light = walls * (1 + rng.uniform(0, 0.15) * np.tanh(light - 1)) + np.where(light > 8, light * 0.5, 0)
+    return light
+
+
+def render(kind, name, mesh, path, folder, rng):
+    vertices, faces, parts = mesh
+    vertices = vertices - (vertices.max(0) + vertices.min(0)) / 2
+    yaw = rng.uniform(0, 6.28)
+    vertices = vertices @ np.array([[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]])
+    vertices /= max(np.hypot(vertices[:, 0], vertices[:, 2]).max(), 0.62 * np.ptp(vertices[:, 1]))
+    vertices[:, 1] -= vertices[:, 1].min() - 1e-3
+    tall, disc, thick = vertices[:, 1].max(), rng.uniform(1.15, 1.7), rng.uniform(0.04, 0.12)
+    edges = vertices[faces[:, 1:]] - vertices[faces[:, :1]]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    chosen = rng.choice(len(faces), 150_000, p=area / area.sum())
+    share = rng.dirichlet([1, 1, 1], len(chosen))
+    surface = (vertices[faces[chosen]] * share[..., None]).sum(1).astype(np.float32)
+    base = turned([[0, 0], [disc, 0], [disc, -thick], [0, -thick]], 0, 160)
+    whole = np.concatenate([vertices, base[0]])
+    triangles = np.concatenate([faces, base[1] + len(vertices)])
+
+    # The camera looks at the object from above and far away.
+    pitch, distance = np.radians(rng.uniform(12, 32)), rng.uniform(6, 9)
+    back = np.array([0, np.sin(pitch), np.cos(pitch)])
+    axes = np.stack([[1, 0, 0], -np.cross(back, [1, 0, 0]), -back], 1)
+    eye = distance * back + [0, 0.42 * tall, 0]
+    seen = (whole - eye) @ axes
+    flat = seen[:len(vertices), :2] / seen[:len(vertices), 2:]
+    zoom = rng.uniform(0.6, 0.8) * min(WIDTH / np.ptp(flat[:, 0]), HEIGHT / np.ptp(flat[:, 1]))
+    middle = np.array([WIDTH / 2, HEIGHT * rng.uniform(0.44, 0.5)]) - zoom * (flat.max(0) + flat.min(0)) / 2
+    places = np.concatenate([FINE * (zoom * seen[:, :2] / seen[:, 2:] + middle), 1 / seen[:, 2:]], 1)
+    fine = (FINE * WIDTH, FINE * HEIGHT)
+    shown, shares = raster(places, triangles, fine)
+
+    # A point of the object and one of the table for each pixel that shows them.
+    is_object = (shown >= 0) & (shown < len(faces))
+    label = np.where(is_object, OBJECT, np.where(shown >= 0, TABLE, ROOM))
+    shares_of = (np.float32(label == k).reshape(fine[1], fine[0]) for k in range(3))
+    cover = [cv2.resize(fully, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA) for fully in shares_of]
+    hit = np.flatnonzero(shown >= 0)
+    target = hit // fine[0] // FINE * WIDTH + hit % fine[0] // FINE
+    _, first = np.unique(target * 3 + label[hit], return_index=True)
+    hit, target = hit[first], target[first]
+    of_table, part_cover = ~is_object[hit], np.stack(cover, -1).reshape(-1, 3)[target, label[hit]]
+    weight = shares[hit] * places[triangles[shown[hit]], 2]
+    weight /= weight.sum(1, keepdims=True)
+    points = (whole[triangles[shown[hit]]] * weight[..., None]).sum(1)
+    flat_normal, corner = normals(whole, triangles)
+    normal = unit((corner[shown[hit]] * weight[..., None]).sum(1))
+    view = unit(eye - points)
+    normal *= np.where((flat_normal[shown[hit]] * view).sum(1, keepdims=True) < 0, -1, 1)
+    albedo = np.full((len(hit), 3), rng.uniform(0.02, 0.04)) * np.where(points[:, 1:2] < -1e-4, rng.choice([0.7, 1, 4]), 1)
+    albedo[~of_table] = paint(kind, points[~of_table], parts[shown[hit][~of_table]], rng)
+    gloss = np.where(of_table, rng.uniform(0, 0.02), rng.uniform(0, 0.04))
+    power = np.where(of_table, rng.uniform(15, 60), rng.uniform(8, 80)).astype(np.float32)
+    fresnel = gloss + (1 - gloss) * np.clip(1 - (normal * view).sum(1), 0, 1) ** 5 * 0.12
+    points, normal, view = (array.astype(np.float32) for array in (points, normal, view))
+
+    light = read_panorama(path, kind, rng)
+    ways = directions().astype(np.float32)
+    soft = np.tile(cv2.resize(light, (192, 96), interpolation=cv2.INTER_AREA), (1, 3, 1))
+    soft = cv2.GaussianBlur(soft, (0, 0), 3)[:, 192:384]
+    turns = 2 * np.pi * np.arange(FRAMES) / FRAMES * rng.choice([-1, 1])
+    sky = np.stack([sampled(soft, ways, turn)[:, 0] for turn in turns], 1)
+    # A hidden direction above the table shows the object in its average light.
+    upper = np.where(ways[:, 1] > 0, 1 / DIRECTIONS, 0)
+    bounced = 0.7 * albedo[~of_table].mean(0) * np.einsum("kfc,k->fc", sky, upper)
+    lit = np.stack([visible(points + np.float32(0.01) * normal, way, surface, disc) for way in ways], 1)
+    still = np.zeros((WIDTH * HEIGHT, FRAMES, 3), np.float32)
+    for some in np.array_split(np.arange(len(hit)), 20):
+        diffuse = np.clip(normal[some] @ ways.T, 0, None) * np.float32(4 / DIRECTIONS)
+        reflected = 2 * (normal[some] * view[some]).sum(1, keepdims=True) * normal[some] - view[some]
+        lobe = np.clip(reflected @ ways.T, 1e-6, None) ** power[some, None]
+        lobe *= (fresnel[some] / lobe.sum(1))[:, None].astype(np.float32)
+        hidden = ~lit[some] & (ways[:, 1] > 0)
+        for c in range(3):
+            transfer = albedo[some, c, None].astype(np.float32) * diffuse + lobe
+            bounce = (transfer * hidden).sum(1)[:, None] * bounced[:, c]
+            radiance = (transfer * lit[some]) @ sky[..., c] + bounce
+            np.add.at(still[..., c], target[some], part_cover[some, None] * radiance)
+    on_object = still[cover[OBJECT].ravel() > 0.99].max(2)
+    level = np.quantile(on_object, 0.97)
+    if kind == "white-room":
+        exposure = rng.uniform(1.1, 1.6)
+    elif kind == "white":
+        exposure = rng.uniform(0.75, 1.5) / level
+    else:
+        bright = 0.25 if kind == "black" else 0.8
+        exposure = min(bright * rng.uniform(0.6, 1.4) / level, rng.uniform(0.6, 2) / np.quantile(light[100:412], 0.9))
+    across, down = np.meshgrid(np.arange(WIDTH) + 0.5 - middle[0], np.arange(HEIGHT) + 0.5 - middle[1])
+    rays = unit(np.stack([across / zoom, down / zoom, np.ones_like(across)], -1) @ axes.T)
+    unsharp = cv2.GaussianBlur(light, (0, 0), rng.uniform(0.7, 3))
+    folder = folder / name
+    folder.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(folder / "mask_gt.png"), np.round(cv2.GaussianBlur(cover[OBJECT], (0, 0), 0.6) * 255).astype(np.uint8))
+    grain = rng.normal(0, 1, (2 * HEIGHT, 2 * WIDTH, 3)).astype(np.float32)
+    noise = rng.uniform(0.3, 2) * 1e-3
+    command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "bgr24", "-s", f"{WIDTH}x{HEIGHT}", "-r", "30", "-i", "-"]
+    command += ["-c:v", "mjpeg", "-q:v", "3", "-pix_fmt", "yuvj422p", "-threads", "1", folder / "video.mkv"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as coder:
+        for frame, turn in enumerate(turns):
+            room = sampled(unsharp, rays, turn) * cover[ROOM][..., None]
+            picture = exposure * (room + still[:, frame].reshape(HEIGHT, WIDTH, 3))
+            picture = cv2.GaussianBlur(np.minimum(picture, 4), (0, 0), 0.6)
+            y, x = rng.integers(0, HEIGHT), rng.integers(0, WIDTH)
+            picture += np.sqrt(noise * picture + 1e-6) * 0.5 * grain[y : y + HEIGHT, x : x + WIDTH]
+            picture = np.clip(picture, 0, 1)
+            coded = np.where(picture < 0.0031308, 12.92 * picture, 1.055 * picture ** (1 / 2.4) - 0.055)
+            coder.stdin.write(np.round(coded * 255).astype(np.uint8).tobytes())
+
+
+def paint(kind, points, parts, rng):
+    """The albedo of an object's points."""
+    many = parts.max() + 1
+    if kind == "black":
+        colours = rng.uniform(0.02, 0.06, (many, 1)) * rng.uniform(0.9, 1.1, (many, 3))
+    elif kind == "white":
+        colours = rng.uniform(0.7, 0.88, (many, 1)) * rng.uniform(0.96, 1, (many, 3))
+    else:
+        colours = rng.uniform(0.05, 0.7, (many, 3)) * rng.uniform(0.4, 1, (many, 1))
+    waves = np.sin(points @ rng.normal(0, 5, 3))[:, None] > rng.uniform(0.2, 1.5)
+    return np.clip(colours[parts] * np.where(waves, rng.uniform(0.5, 1), 1), 0.01, 0.9)
+
+
+def make(arguments):
+    meshes = sources(arguments.meshes)
+    panoramas = sorted(arguments.panoramas.glob("*.hdr"))
+    is_open = [name for name in meshes if OPEN.search(name)] or list(meshes)
+    for number in range(arguments.seed, arguments.seed + arguments.count):
+        rng = np.random.default_rng(number)
+        kind = KINDS[number % len(KINDS)]
+        what = rng.choice(BUILT) if rng.random() < 0.4 else str(rng.choice(is_open if kind == "openings" else list(meshes)))
+        mesh = built(what, rng) if what in BUILT else meshes[what]()
+        path = panoramas[rng.integers(len(panoramas))]
+        name = f"{number:04}-{kind}-{what}"
+        render(kind, name, mesh, path, arguments.folder, rng)
+        print(name, path.stem, flush=True)
+
+
+def overlap(mask, truth):
+    return (mask & truth).sum() / max((mask | truth).sum(), 1)
+
+
+def read_mask(path):
+    return cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) >= 128
+
+
+def planted(truth, rng):
+    """Masks with a fault, and masks without, by name."""
+    area, disc = truth.sum(), lambda size: cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    as_bytes = truth.astype(np.uint8)
+    right = {"right": truth, "narrow": cv2.erode(as_bytes, disc(3)) > 0, "wide": cv2.dilate(as_bytes, disc(3)) > 0}
+    wrong = {}
+    _, holes, figures, _ = cv2.connectedComponentsWithStats((~truth).astype(np.uint8), connectivity=4)
+    for hole in range(1, len(figures)):
+        opened = cv2.morphologyEx((holes == hole).astype(np.uint8), cv2.MORPH_OPEN, disc(5)).sum()
+        if hole != holes[0, 0] and opened >= 0.003 * area and len(wrong) < 3:
+            wrong[f"opening {hole}"] = truth | (holes == hole)
+    rows, columns = np.nonzero(truth)
+    for side in (-1, 1):
+        # A whisker of two rows' height at the height at which the object is widest.
+        reach = [(columns[rows == y] * side).max() if (rows == y).any() else -WIDTH for y in range(HEIGHT)]
+        y = int(np.argmax(reach))
+        end = int(abs(reach[y]))
+        whisker = truth.copy()
+        whisker[y : y + 2, slice(end, end + 36) if side > 0 else slice(max(end - 36, 0), end)] = True
+        if min(end, WIDTH - end) > 50:
+            wrong[f"whisker {side}"] = whisker
+    for where, half in (("above", rows < np.quantile(rows, 0.5)), ("below", rows > np.quantile(rows, 0.7))):
+        # A round piece of 1 to 2 % of the object beside its outline: room, or table.
+        radius = (rng.uniform(0.01, 0.02) * area / 2.2) ** 0.5
+        outline = as_bytes - cv2.erode(as_bytes, disc(3))
+        candidates = np.flatnonzero(outline.ravel() & np.isin(np.arange(truth.size), (rows * WIDTH + columns)[half]))
+        for at in rng.permutation(candidates)[:50]:
+            blob = cv2.circle(np.zeros_like(as_bytes), (int(at % WIDTH), int(at // WIDTH)), int(np.ceil(radius * 1.3)), 1, -1) > 0
+            if 0.01 * area <= (blob & ~truth).sum() <= 0.03 * area:
+                wrong[f"piece {where}"] = truth | blob
+                break
+    return right, wrong
+
+
+def checked(program, session, mask, folder):
+    path = pathlib.Path(folder) / "mask.png"
+    cv2.imwrite(str(path), mask.astype(np.uint8) * 255)
+    answer = subprocess.run([program, "check", session, "--mask", path, "--json"], capture_output=True, text=True).stdout
+    found = re.search(r'"verdict": ?"(\w+)"', answer)
+    return found.group(1) if found else "failed"
+
+
+def mean(values):
+    values = np.array(values, float)
+    return f"{values.mean():.3f} ± {values.std(ddof=1) / len(values) ** 0.5 if len(values) > 1 else 0:.3f}"
+
+
+def kind_of(name):
+    return max((kind for kind in KINDS if name[5:].startswith(f"{kind}-")), key=len)
+
+
+def measure(arguments):
+    overlaps, found, alarms = {}, {}, {}
+    for session in sorted(path.parent for path in arguments.folder.glob("*/mask_gt.png")):
+        truth = read_mask(session / "mask_gt.png")
+        with tempfile.TemporaryDirectory() as folder:
+            output = session / "mask.png" if arguments.keep else pathlib.Path(folder) / "auto.png"
+            command = [arguments.program, session, "--auto", "--force", "-o", output]
+            made = subprocess.run(command, capture_output=True).returncode == 0
+            overlaps[session.name] = overlap(read_mask(output), truth) if made else 0.0
+            line = f"{session.name}: {overlaps[session.name]:.4f}"
+            if arguments.check:
+                right, wrong = planted(truth, np.random.default_rng(int(session.name[:4])))
+                for masks, table in ((right, alarms), (wrong, found)):
+                    for what, mask in masks.items():
+                        verdict = checked(arguments.program, session, mask, folder)
+                        table.setdefault(what.split(" ")[0], []).append((session.name, verdict))
+                        line += f", {what} {verdict}"
+        if arguments.each:
+            print(line, flush=True)
+    print("| turns | overlap | least | 0.97 or more |\n| --- | --- | --- | --- |")
+    for kind in ["all", *KINDS]:
+        some = list(overlaps.values()) if kind == "all" else [value for name, value in overlaps.items() if kind_of(name) == kind]
+        if some:
+            print(f"| {len(some)} {kind} | {mean(some)} | {min(some):.3f} | {sum(value >= 0.97 for value in some)} |")
+    for title, table in (("faults", found), ("right masks", alarms)):
+        for what, verdicts in [("all", sum(table.values(), [])), *table.items()]:
+            if verdicts:
+                # The standard error is that of the turns, whose masks are not independent.
+                shares = [np.mean([v == "wrong" for n, v in verdicts if n == name]) for name in {n for n, _ in verdicts}]
+                called = sum(verdict == "wrong" for _, verdict in verdicts)
+                unknown = sum(verdict not in ("wrong", "fits") for _, verdict in verdicts)
+                print(f"{title}, {what}: {called} of {len(verdicts)} called wrong (by turns {mean(shares)}), {unknown} unknown")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    verbs = parser.add_subparsers(required=True)
+    making = verbs.add_parser("make")
+    for name in ("meshes", "panoramas", "folder"):
+        making.add_argument(name, type=pathlib.Path)
+    making.add_argument("--count", type=int, default=20)
+    making.add_argument("--seed", type=int, default=1000)
+    making.set_defaults(run=make)
+    measuring = verbs.add_parser("measure")
+    measuring.add_argument("program", type=pathlib.Path)
+    measuring.add_argument("folder", type=pathlib.Path)
+    measuring.add_argument("--each", action="store_true", help="print the results of each turn")
+    measuring.add_argument("--check", action="store_true", help="measure the check, too")
+    measuring.add_argument("--keep", action="store_true", help="keep the masks in the turns' folders")
+    measuring.set_defaults(run=measure)
+    arguments = parser.parse_args()
+    arguments.run(arguments)
+
+
+if __name__ == "__main__":
+    main()
