@@ -33,6 +33,8 @@ use crate::{Effort, Hints};
 pub const MIN_TURN_FRAMES: usize = 4;
 /// Frames that are sampled of a turn.
 pub const TURN_FRAMES: usize = 32;
+/// The table's model is learned so many times, each time from a better cut.
+const LEARNED: usize = 5;
 /// Frames are halved until they have at most so many pixels.
 const MAX_PIXELS: usize = 600_000;
 /// And once more for the first cut, until they have at most so many.
@@ -130,26 +132,43 @@ impl TurnStatistics {
             TurnField::new(&half, &colours)
         });
         let series = PixelSeries::new(&turn.frames, fine.size);
-        let object = match &coarse {
-            Some(coarse) => coarse.own_cut().map(|object| object.enlarged(2, fine.size)),
-            None => fine.own_cut(),
-        };
-        let model = object.as_ref();
-        let model = model.and_then(|object| fine.table_model(&series, object));
-        let is_dark = model.as_ref().is_some_and(|model| !model.object_is_bright);
-        if let Some(model) = &model {
-            fine.learn_table(model);
-            if let Some(coarse) = &mut coarse {
-                coarse.learn_table(&model.halved());
+        let first = own_cut(&fine, coarse.as_ref());
+        let mut object = first.clone();
+        let mut model = None;
+        let before =
+            [Some(&fine), coarse.as_ref()].map(|field| field.map(TurnField::without_table));
+        for round in 0..LEARNED {
+            if round > 0 {
+                object = own_cut(&fine, coarse.as_ref()).or(object);
             }
+            let Some(learned) = object
+                .as_ref()
+                .and_then(|object| fine.table_model(&series, object))
+            else {
+                break;
+            };
+            for (field, (evidence, backdrop)) in [Some(&mut fine), coarse.as_mut()]
+                .into_iter()
+                .flatten()
+                .zip(before.iter().flatten())
+            {
+                field.evidence.clone_from(evidence);
+                field.backdrop.clone_from(backdrop);
+            }
+            fine.learn_table(&learned);
+            if let Some(coarse) = &mut coarse {
+                coarse.learn_table(&learned.halved());
+            }
+            model = Some(learned);
         }
+        let is_dark = model.is_some_and(|model| !model.object_is_bright);
         Self {
             frames: turn.frames.len(),
             full: turn.full,
             fine,
             coarse,
             series,
-            dark_object: object.filter(|_| is_dark),
+            dark_object: first.filter(|_| is_dark),
         }
     }
 
@@ -198,6 +217,14 @@ impl TurnStatistics {
         }
         let (_, change, _) = changes.select_nth_unstable_by(upper, f32::total_cmp);
         *change > CHANGE_WEIGHT * STILL.ln_1p()
+    }
+}
+
+/// The object as the fields show it alone, in the size of the fine one.
+fn own_cut(fine: &TurnField, coarse: Option<&TurnField>) -> Option<Bitmap> {
+    match coarse {
+        Some(coarse) => coarse.own_cut().map(|object| object.enlarged(2, fine.size)),
+        None => fine.own_cut(),
     }
 }
 
@@ -277,13 +304,14 @@ impl TurnField {
         let contrasts: Vec<[f32; 4]> = (0..count).map(contrast).collect();
         let lasting = largest(&steps, size).into_iter().map(|steps| steps / many);
         let lasting: Vec<f32> = lasting.collect();
-        let table = find_turntable(&features, &lasting, size);
+        let temporal_evidence = curves.finish();
+        let table = find_turntable(&features, &lasting, &temporal_evidence, size);
         let backdrop = Backdrop::new(&features, &table, size);
         Self {
             size,
             backdrop: backdrop.alike,
             evidence: backdrop.evidence,
-            temporal_evidence: curves.finish(),
+            temporal_evidence,
             seen_table: None,
             white: white(frames, size),
             table,
@@ -295,7 +323,12 @@ impl TurnField {
 }
 
 impl TurnField {
-    /// The object as the turn shows it before the table is known.
+    /// What is evidence before the table is learned.
+    fn without_table(&self) -> (Vec<f32>, Bitmap) {
+        (self.evidence.clone(), self.backdrop.clone())
+    }
+
+    /// The object by what is known so far.
     fn own_cut(&self) -> Option<Bitmap> {
         let size = (self.size.0 as u32, self.size.1 as u32);
         let border = ring(size, BORDER);

@@ -1,5 +1,6 @@
 //! The turntable itself: still, dark, without colour or structure, below the object.
 
+use super::temporal_evidence::TemporalEvidence;
 use crate::bitmap::{Bitmap, Connectivity};
 
 /// Largest average brightness, as a feature.
@@ -14,7 +15,12 @@ const STRUCTURE: f32 = 0.3;
 const MIN_PART: f64 = 0.01;
 /// It comes as near to the lower border as this share of the height, or is this share of the width wide.
 const FOOT: f64 = 0.03;
-const WIDE: f64 = 0.5;
+const WIDE: f64 = 0.35;
+/// The object may divide the table: another part of it is at least this share of that large, and differs at most so much
+/// in brightness and colour, as features.
+const JOINED: f64 = 0.1;
+const PART_LIGHT: f32 = 2.0;
+const PART_COLOUR: f32 = 2.0;
 
 /// The largest brightness that a shadow on the table has beyond the table's, as a feature.
 const SHADOW_LIGHT: f32 = 0.3;
@@ -34,11 +40,12 @@ pub(crate) struct Turntable {
     pub(crate) plain: Bitmap,
 }
 
-/// The table, from the features of a turn (average L, a, b, changes of light and colour)
-/// and the share of frames with an edge next to each pixel. Empty if none is found.
+/// The table, from the features of a turn (average L, a, b, changes of light and colour), the share of frames with an
+/// edge next to each pixel, and the curves of brightness. Empty if none is found.
 pub(crate) fn find_turntable(
     features: &[[f32; 5]],
     lasting: &[f32],
+    curves: &TemporalEvidence,
     size: (usize, usize),
 ) -> Turntable {
     let (width, height) = size;
@@ -57,27 +64,47 @@ pub(crate) fn find_turntable(
             below[component] += 1;
         }
     }
-    let lowest = below
-        .iter()
-        .enumerate()
-        .max_by_key(|&(at, count)| (count, std::cmp::Reverse(at)));
     let least = (width * height) as f64 * MIN_PART;
-    let lowest = lowest
-        .map(|(at, _)| at)
-        .filter(|&at| components.list[at].area as f64 >= least)
-        .filter(|&at| {
-            let bounds = components.list[at].bounds;
-            let gap = height as i64 - bounds.bottom();
-            gap as f64 <= height as f64 * FOOT || f64::from(bounds.w) >= width as f64 * WIDE
-        });
-    let is_table = |at: usize, _| lowest.is_some() && components.at(at) == lowest;
-    let surface = inner.map(is_table).dilated(1);
+    let parts = |least: f64| {
+        let large = components.list.iter().enumerate();
+        let large = large.filter(move |(_, part)| part.area as f64 >= least);
+        large.map(|(at, _)| (at, inner.map(|pixel, _| components.at(pixel) == Some(at))))
+    };
+    // A dark floor of the room is as far below, but shows something else all the time.
+    let score = |at: usize, part: &Bitmap| {
+        let residual = curves.residual_of(part).unwrap_or(1.0);
+        below[at] as f32 / residual.sqrt()
+    };
+    let scored = parts(least).map(|(at, part)| (score(at, &part), part));
+    let best = scored.max_by(|(one, _), (other, _)| one.total_cmp(other));
+    let nothing = || inner.minus(&inner);
+    let mut found = best.map_or_else(nothing, |(_, part)| part);
+    if let Some(of_table) = mean(features, &found) {
+        for (_, part) in parts(JOINED * least) {
+            if is_alike(&of_table, mean(features, &part)) && curves.together(&part, &found) {
+                found = found.or(&part);
+            }
+        }
+    }
+    let bounds = found.bounds();
+    let gap = height as i64 - bounds.bottom();
+    if gap as f64 > height as f64 * FOOT && f64::from(bounds.w) < width as f64 * WIDE {
+        found = nothing();
+    }
+    let surface = found.dilated(1);
     let shadow = shadow(features, lasting, &surface, size);
     Turntable {
         surface,
         shadow,
         plain,
     }
+}
+
+/// Whether the average colour of a part is about that of the table.
+fn is_alike(table: &[f32; 3], part: Option<[f32; 3]>) -> bool {
+    part.is_some_and(|[light, a, b]| {
+        (light - table[0]).abs() < PART_LIGHT && (a - table[1]).hypot(b - table[2]) < PART_COLOUR
+    })
 }
 
 /// Grows from the surface, row by row and column by column, over what may be its shadow.
@@ -117,6 +144,7 @@ fn mean(features: &[[f32; 5]], surface: &Bitmap) -> Option<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::turn::temporal_evidence::Curves;
 
     const SIZE: (usize, usize) = (40, 30);
 
@@ -150,10 +178,14 @@ mod tests {
         )
     }
 
+    fn no_curves() -> TemporalEvidence {
+        Curves::new(0, 1200).finish()
+    }
+
     #[test]
     fn the_table_is_found_and_the_dark_object_on_it_is_not() {
         let (features, lasting) = scene();
-        let table = find_turntable(&features, &lasting, SIZE);
+        let table = find_turntable(&features, &lasting, &no_curves(), SIZE);
         let at = |x: usize, y: usize| table.surface.bits()[y * 40 + x];
         assert!(at(8, 24) && at(30, 28) && at(20, 27));
         assert!(!at(20, 12) && !at(20, 20) && !at(2, 2));
@@ -166,6 +198,7 @@ mod tests {
             .iter()
             .map(|f| [f[0] + 20.0, f[1], f[2], f[3], f[4]])
             .collect();
-        assert_eq!(find_turntable(&bright, &lasting, SIZE).surface.count(), 0);
+        let table = find_turntable(&bright, &lasting, &no_curves(), SIZE);
+        assert_eq!(table.surface.count(), 0);
     }
 }

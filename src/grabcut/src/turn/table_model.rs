@@ -63,12 +63,12 @@ const BINS: usize = 36;
 const MIN_SPREAD: f32 = 0.2;
 /// Openings are in shade, and further from the table than it is on average: the spread is so many times as wide there.
 const SHADED: f32 = 2.0;
-/// An object is bright if at least half of it has a measure of its darkness that is smaller than the table's by this.
+/// An object is bright if at least a third of it has a measure of its darkness that is smaller than the table's by this.
 const FAR_BRIGHTER: f32 = 3.0;
 /// Of a bright object one of so many of the pixels that are as dark as the table counts as its own.
 const DOUBTED: usize = 4;
 /// At most this share of what looks like the object is table.
-const MAX_INCLUDED: f32 = 0.2;
+const MAX_INCLUDED: f32 = 0.6;
 /// The object has each distance with at least this density, and so has the table, which an object lights from nearby.
 const FLOOR: f32 = 0.01;
 const TABLE_FLOOR: f32 = 0.03;
@@ -105,7 +105,7 @@ pub(crate) struct TableModel {
     as_unshaded: Bitmap,
     /// The pixels that are about as bright as the unshaded table in the frames in which they are brightest.
     as_bright: Bitmap,
-    /// Whether most of the object that was found is far brighter than the table.
+    /// Whether a third of the object that was found is far brighter than the table.
     pub(crate) object_is_bright: bool,
     size: (usize, usize),
 }
@@ -135,7 +135,7 @@ impl TableModel {
         let of_table = TableDensity::learn(taken.iter().map(|&at| darker[at]))?;
         let core = seen.object.eroded(2);
         let far_brighter = core.map(|at, bit| bit && darker[at] < of_table.middle - FAR_BRIGHTER);
-        let object_is_bright = 2 * far_brighter.count() >= core.count();
+        let object_is_bright = 3 * far_brighter.count() >= core.count();
         // What is dark in a bright object may be table in its shade, which the first cut took for a part of it.
         let least = of_table.middle - of_table.spread;
         let doubted = |at: usize| object_is_bright && darker[at] > least;

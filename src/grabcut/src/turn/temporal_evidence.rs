@@ -135,7 +135,7 @@ impl TemporalEvidence {
     }
 
     /// The median residual of a part.
-    fn residual_of(&self, part: &Bitmap) -> Option<f32> {
+    pub(crate) fn residual_of(&self, part: &Bitmap) -> Option<f32> {
         let pairs = part.bits().iter().zip(&self.residual);
         let mut values: Vec<f32> = pairs
             .filter(|(bit, _)| **bit)
