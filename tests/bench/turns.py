@@ -11,6 +11,7 @@ on the table). FOLDER/NUMBER-KIND-OBJECT gets `video.mkv` (Motion JPEG, one turn
 """
 
 import argparse
+import concurrent.futures
 import pathlib
 import re
 import subprocess
@@ -382,88 +383,77 @@ def read_mask(path):
 
 
 def planted(truth, rng):
-    """Masks with a fault, and masks without, by name."""
+    """Masks without a fault, and masks with one, by name."""
     area, disc = truth.sum(), lambda size: cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     as_bytes = truth.astype(np.uint8)
-    right = {"right": truth, "narrow": cv2.erode(as_bytes, disc(3)) > 0, "wide": cv2.dilate(as_bytes, disc(3)) > 0}
+    right = {"exact": truth, "narrow": cv2.erode(as_bytes, disc(3)) > 0, "wide": cv2.dilate(as_bytes, disc(3)) > 0}
     wrong = {}
     _, holes, figures, _ = cv2.connectedComponentsWithStats((~truth).astype(np.uint8), connectivity=4)
-    for hole in range(1, len(figures)):
-        opened = cv2.morphologyEx((holes == hole).astype(np.uint8), cv2.MORPH_OPEN, disc(5)).sum()
-        if hole != holes[0, 0] and opened >= 0.003 * area and len(wrong) < 3:
-            wrong[f"opening {hole}"] = truth | (holes == hole)
+    inside = [hole for hole in range(1, len(figures)) if hole != holes[0, 0]]
+    hole = max(inside, key=lambda hole: figures[hole, cv2.CC_STAT_AREA], default=0)
+    if hole and cv2.morphologyEx((holes == hole).astype(np.uint8), cv2.MORPH_OPEN, disc(5)).sum() >= 0.003 * area:
+        wrong["opening"] = truth | (holes == hole)
+    # A whisker of two rows where the object reaches furthest to the left, or else to the right.
     rows, columns = np.nonzero(truth)
-    for side in (-1, 1):
-        # A whisker of two rows' height at the height at which the object is widest.
-        reach = [(columns[rows == y] * side).max() if (rows == y).any() else -WIDTH for y in range(HEIGHT)]
-        y = int(np.argmax(reach))
-        end = int(abs(reach[y]))
-        whisker = truth.copy()
-        whisker[y : y + 2, slice(end, end + 36) if side > 0 else slice(max(end - 36, 0), end)] = True
-        if min(end, WIDTH - end) > 50:
-            wrong[f"whisker {side}"] = whisker
-    for where, half in (("above", rows < np.quantile(rows, 0.5)), ("below", rows > np.quantile(rows, 0.7))):
-        # A round piece of 1 to 2 % of the object beside its outline: room, or table.
-        radius = (rng.uniform(0.01, 0.02) * area / 2.2) ** 0.5
-        outline = as_bytes - cv2.erode(as_bytes, disc(3))
-        candidates = np.flatnonzero(outline.ravel() & np.isin(np.arange(truth.size), (rows * WIDTH + columns)[half]))
-        for at in rng.permutation(candidates)[:50]:
-            blob = cv2.circle(np.zeros_like(as_bytes), (int(at % WIDTH), int(at // WIDTH)), int(np.ceil(radius * 1.3)), 1, -1) > 0
+    for y, end, reach in ((rows[columns.argmin()], columns.min(), -36), (rows[columns.argmax()], columns.max(), 36)):
+        if 50 < end < WIDTH - 50:
+            wrong["whisker"] = truth.copy()
+            wrong["whisker"][y : y + 2, min(end, end + reach) : max(end, end + reach)] = True
+            break
+    # A round piece of 1 to 3 % of the object beside its outline: room, or table.
+    for name, half in (("piece above", rows < np.quantile(rows, 0.5)), ("piece below", rows > np.quantile(rows, 0.7))):
+        radius = int(np.ceil(1.3 * (rng.uniform(0.01, 0.02) * area / 2.2) ** 0.5))
+        outline = (as_bytes - cv2.erode(as_bytes, disc(3)))[rows, columns] > 0
+        for at in rng.permutation(np.flatnonzero(outline & half))[:50]:
+            blob = cv2.circle(np.zeros_like(as_bytes), (int(columns[at]), int(rows[at])), radius, 1, -1) > 0
             if 0.01 * area <= (blob & ~truth).sum() <= 0.03 * area:
-                wrong[f"piece {where}"] = truth | blob
+                wrong[name] = truth | blob
                 break
     return right, wrong
 
 
-def checked(program, session, mask, folder):
-    path = pathlib.Path(folder) / "mask.png"
-    cv2.imwrite(str(path), mask.astype(np.uint8) * 255)
+def verdict(program, session, mask, path):
+    cv2.imwrite(path, mask.astype(np.uint8) * 255)
     answer = subprocess.run([program, "check", session, "--mask", path, "--json"], capture_output=True, text=True).stdout
     found = re.search(r'"verdict": ?"(\w+)"', answer)
     return found.group(1) if found else "failed"
 
 
+def judge(program, session, check):
+    """A turn's name, the overlap of its mask, and the verdicts on other masks."""
+    truth = read_mask(session / "mask_gt.png")
+    with tempfile.TemporaryDirectory() as folder:
+        path = f"{folder}/mask.png"
+        made = subprocess.run([program, session, "--auto", "--force", "-o", path], capture_output=True).returncode == 0
+        own = overlap(read_mask(path), truth) if made else 0.0
+        masks = planted(truth, np.random.default_rng(int(session.name[:4]))) if check else ({}, {})
+        verdicts = [{what: verdict(program, session, mask, path) for what, mask in some.items()} for some in masks]
+    print(f"{session.name}: {own:.3f}", *(f"{what} {says}" for some in verdicts for what, says in some.items()), sep=", ", flush=True)
+    return session.name, own, verdicts
+
+
 def mean(values):
-    values = np.array(values, float)
-    return f"{values.mean():.3f} ± {values.std(ddof=1) / len(values) ** 0.5 if len(values) > 1 else 0:.3f}"
-
-
-def kind_of(name):
-    return max((kind for kind in KINDS if name[5:].startswith(f"{kind}-")), key=len)
+    error = np.std(values, ddof=1) / len(values) ** 0.5 if len(values) > 1 else 0
+    return f"{np.mean(values):.3f} ± {error:.3f}"
 
 
 def measure(arguments):
-    overlaps, found, alarms = {}, {}, {}
-    for session in sorted(path.parent for path in arguments.folder.glob("*/mask_gt.png")):
-        truth = read_mask(session / "mask_gt.png")
-        with tempfile.TemporaryDirectory() as folder:
-            output = session / "mask.png" if arguments.keep else pathlib.Path(folder) / "auto.png"
-            command = [arguments.program, session, "--auto", "--force", "-o", output]
-            made = subprocess.run(command, capture_output=True).returncode == 0
-            overlaps[session.name] = overlap(read_mask(output), truth) if made else 0.0
-            line = f"{session.name}: {overlaps[session.name]:.4f}"
-            if arguments.check:
-                right, wrong = planted(truth, np.random.default_rng(int(session.name[:4])))
-                for masks, table in ((right, alarms), (wrong, found)):
-                    for what, mask in masks.items():
-                        verdict = checked(arguments.program, session, mask, folder)
-                        table.setdefault(what.split(" ")[0], []).append((session.name, verdict))
-                        line += f", {what} {verdict}"
-        if arguments.each:
-            print(line, flush=True)
+    sessions = sorted(path.parent for path in arguments.folder.glob("*/mask_gt.png"))
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        judged = list(pool.map(lambda session: judge(arguments.program, session, arguments.check), sessions))
     print("| turns | overlap | least | 0.97 or more |\n| --- | --- | --- | --- |")
-    for kind in ["all", *KINDS]:
-        some = list(overlaps.values()) if kind == "all" else [value for name, value in overlaps.items() if kind_of(name) == kind]
+    for kind in ["", *KINDS]:
+        some = [own for name, own, _ in judged if re.fullmatch(rf"\d+-{kind}(-(?!room-).*)?" if kind else ".*", name)]
         if some:
             print(f"| {len(some)} {kind} | {mean(some)} | {min(some):.3f} | {sum(value >= 0.97 for value in some)} |")
-    for title, table in (("faults", found), ("right masks", alarms)):
-        for what, verdicts in [("all", sum(table.values(), [])), *table.items()]:
-            if verdicts:
-                # The standard error is that of the turns, whose masks are not independent.
-                shares = [np.mean([v == "wrong" for n, v in verdicts if n == name]) for name in {n for n, _ in verdicts}]
-                called = sum(verdict == "wrong" for _, verdict in verdicts)
-                unknown = sum(verdict not in ("wrong", "fits") for _, verdict in verdicts)
-                print(f"{title}, {what}: {called} of {len(verdicts)} called wrong (by turns {mean(shares)}), {unknown} unknown")
+    for which, title in enumerate(("right masks", "faults")) if arguments.check else ():
+        verdicts = [turn[which] for _, _, turn in judged]
+        for what in ["", *dict.fromkeys(what for turn in verdicts for what in turn)]:
+            turns = [[says for name, says in turn.items() if what in name] for turn in verdicts]
+            turns = [turn for turn in turns if turn]
+            counts = {says: sum(turn.count(says) for turn in turns) for says in ("wrong", "fits", "unknown")}
+            # The masks of a turn are not independent: the standard error is that of the turns.
+            print(f"{title} {what}: {counts}; wrong by turns {mean([np.mean([says == 'wrong' for says in turn]) for turn in turns])}")
 
 
 def main():
@@ -478,9 +468,7 @@ def main():
     measuring = verbs.add_parser("measure")
     measuring.add_argument("program", type=pathlib.Path)
     measuring.add_argument("folder", type=pathlib.Path)
-    measuring.add_argument("--each", action="store_true", help="print the results of each turn")
     measuring.add_argument("--check", action="store_true", help="measure the check, too")
-    measuring.add_argument("--keep", action="store_true", help="keep the masks in the turns' folders")
     measuring.set_defaults(run=measure)
     arguments = parser.parse_args()
     arguments.run(arguments)
