@@ -138,7 +138,7 @@ fn warnings(shape: &ShapeCheck) -> MaskWarnings {
 }
 
 fn is_of_another_object(shape: &ShapeCheck) -> bool {
-    let regions = [&shape.leaks, &shape.missing, &shape.holes];
+    let regions = [&shape.leaks, &shape.missing];
     let wrong_px: u64 = regions.into_iter().flatten().map(|region| region.px).sum();
     let has_other_outline = shape.outline < OTHER_OUTLINE * shape.outline_of_turn;
     let has_other_area = wrong_px as f64 > OTHER_AREA * shape.area_px as f64;

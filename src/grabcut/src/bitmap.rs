@@ -386,4 +386,11 @@ mod tests {
         assert_eq!(bitmap.bounds(), Rect::new(0, 0, 0, 0));
         assert_eq!(bitmap.inverted().bounds(), Rect::new(0, 0, 3, 2));
     }
+
+    #[test]
+    fn only_what_is_enclosed_is_a_hole() {
+        let rows = ["#####", "#.#.#", "###.#"];
+        let wanted = [".....", ".#...", "....."];
+        assert_eq!(Bitmap::drawn(&rows).holes(), Bitmap::drawn(&wanted));
+    }
 }

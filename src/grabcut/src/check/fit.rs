@@ -1,7 +1,7 @@
 //! Whether a mask fits a turn: where its shape differs from what the turn shows.
 //!
 //! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of
-//! brightness there show decides.
+//! brightness and the lasting edges there show decides.
 
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
@@ -47,10 +47,8 @@ pub struct ShapeCheck {
     /// Long thin parts of the mask that show what is on both sides of them, as pieces of the table's rim do, largest
     /// first.
     pub whiskers: Vec<DoubtfulRegion>,
-    /// Parts outside the mask that show the object, largest first.
+    /// Parts outside the mask that show the object, holes too, largest first.
     pub missing: Vec<DoubtfulRegion>,
-    /// Holes in the mask that show the object, largest first.
-    pub holes: Vec<DoubtfulRegion>,
 }
 
 impl ShapeCheck {
@@ -59,12 +57,7 @@ impl ShapeCheck {
     pub fn enlarged(mut self, by: u32) -> Self {
         let area = u64::from(by) * u64::from(by);
         self.area_px *= area;
-        let regions = [
-            &mut self.leaks,
-            &mut self.whiskers,
-            &mut self.missing,
-            &mut self.holes,
-        ];
+        let regions = [&mut self.leaks, &mut self.whiskers, &mut self.missing];
         for region in regions.into_iter().flatten() {
             let Rect { x, y, w, h } = region.bounds;
             let signed = i32::try_from(by).unwrap_or(i32::MAX);
@@ -116,14 +109,16 @@ impl<'a> MaskCheck<'a> {
             }
             own => Bitmap::from_mask(&own?.image),
         };
-        let in_hole = self.mask.holes();
         let wide = NARROW * self.turn.factor();
         let leaks = self.without_cut_off(&self.mask.minus(&own).opened(wide));
-        let missing = own.minus(&self.mask).minus(&in_hole).opened(wide);
+        let missing = own.minus(&self.mask).opened(wide);
         let differing = leaks.count() + missing.count();
         // The curves compare a part with the rest of the mask, which is no witness where it is the smaller one.
         let witnessed = 2 * leaks.count() < self.mask.count();
         let clear = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
+            if turn.ends_without_edge(part, mask) {
+                return Some(true);
+            }
             // A draft only has to suspect.
             let is_clear =
                 || effort == Effort::Draft || turn.is_clearly_background(part, mask, moves);
@@ -134,17 +129,11 @@ impl<'a> MaskCheck<'a> {
         let leaks = self.shown(&leaks, |turn, part, mask| {
             clear(turn, part, mask) == Some(true)
         });
-        let leaks = leaks.or(&self.table_seen());
         let whiskers = self.whiskers(&own);
-        let (missing, filled) = if moves {
-            // Whatever the turn's own mask says of a hole, the picture in it decides.
-            let is_filled = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
-                turn.is_background(part, mask) == Some(false)
-            };
-            let filled = self.shown(&in_hole.opened(wide), is_filled);
-            (self.shown(&missing, TurnField::belongs), filled)
+        let missing = if moves {
+            self.shown(&missing, TurnField::belongs)
         } else {
-            (self.mask.minus(&self.mask), self.mask.minus(&self.mask))
+            missing.minus(&missing)
         };
         let undisputed = leaks.count() + missing.count() + undecided.count() == 0;
         let least = self.mask.count() as f64 * SMALL;
@@ -160,7 +149,6 @@ impl<'a> MaskCheck<'a> {
             leaks: regions(&leaks, least),
             whiskers: regions(&whiskers, 0.0),
             missing: regions(&missing, least),
-            holes: regions(&filled, least),
         };
         Ok((moves || !shape.faults().is_empty()).then_some(shape))
     }
@@ -174,21 +162,6 @@ impl<'a> MaskCheck<'a> {
             let part = || self.turn.downscaled(&part());
             component.area as f64 >= least && says(&self.turn.fine, &part(), &object)
         })
-    }
-
-    /// Parts of the mask that the table's model takes for the table, whatever a cut says.
-    fn table_seen(&self) -> Bitmap {
-        let object = self.turn.downscaled(&self.mask);
-        let Some(table) = &self.turn.fine.seen_table else {
-            return self.mask.minus(&self.mask);
-        };
-        let wide = table
-            .as_bright
-            .and(&object)
-            .opened(NARROW)
-            .dilated(NARROW)
-            .and(&object);
-        self.shown(&self.upscaled(&wide), TurnField::shows_table)
     }
 
     /// Thin parts of the mask that neither the turn's own has nor the object.
@@ -282,20 +255,12 @@ mod tests {
             contradicted: false,
             leaks: vec![region],
             whiskers: Vec::new(),
-            missing: Vec::new(),
-            holes: vec![region],
+            missing: vec![region],
         };
         let large = small.clone().enlarged(4);
         assert_eq!(large.area_px, 800);
         assert_eq!(large.leaks[0].px, 48);
-        assert_eq!(large.holes[0].bounds, Rect::new(4, 8, 12, 4));
+        assert_eq!(large.missing[0].bounds, Rect::new(4, 8, 12, 4));
         assert_eq!(small.clone().enlarged(1), small);
-    }
-
-    #[test]
-    fn only_what_is_enclosed_is_a_hole() {
-        let rows = ["#####", "#.#.#", "###.#"];
-        let wanted = [".....", ".#...", "....."];
-        assert_eq!(Bitmap::drawn(&rows).holes(), Bitmap::drawn(&wanted));
     }
 }

@@ -2,8 +2,7 @@
 
 use crate::{DoubtfulRegion, ShapeCheck};
 
-/// Parts of the object that are not in the mask, or holes in it, may have this share of its area, where all of the turn
-/// is looked at.
+/// Parts of the object that are not in the mask may have this share of its area, where all of the turn is looked at.
 const MAX_REGION: f64 = 0.01;
 /// The same of parts of the mask that are background: what they show is known better.
 const MAX_LEAK: f64 = 0.0025;
@@ -11,7 +10,7 @@ const MAX_LEAK: f64 = 0.0025;
 const MAX_REGION_OF_A_LOOK: f64 = 0.03;
 /// The mask's outline follows what moves at least so well, compared with the turn's own.
 const MIN_OUTLINE: f32 = 0.85;
-/// Where it follows it better than the turn's own, differences are the turn's mistakes.
+/// Where it follows it better than the turn's own, what only that has is the turn's mistake.
 const BETTER_OUTLINE: f32 = 1.05;
 /// A mask with more of its area wrong than this share is that of something else.
 const SOMETHING_ELSE: f64 = 0.2;
@@ -26,7 +25,7 @@ impl ShapeCheck {
     /// at as a whole.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = faults(self, MAX_LEAK, MAX_REGION);
-        if !self.whiskers.is_empty() && !self.is_better_than_turn() {
+        if !self.whiskers.is_empty() {
             faults.push(format!(
                 "thin parts of the mask that are not the object, as pieces of the table's rim, at {}: mark them black, in --edit or in seeds",
                 places(&self.whiskers)
@@ -41,7 +40,7 @@ impl ShapeCheck {
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
-    /// or much of the object is not in it: around it, or in its holes, as of one that is inverted.
+    /// or much of the object is not in it.
     pub fn is_of_another_object(&self) -> bool {
         let share = |regions: &[DoubtfulRegion]| {
             let px: u64 = regions.iter().map(|region| region.px).sum();
@@ -52,11 +51,10 @@ impl ShapeCheck {
         } else {
             SOMETHING_ELSE
         };
-        share(&self.leaks) > most_background
-            || share(&self.missing) + share(&self.holes) > SOMETHING_ELSE
+        share(&self.leaks) > most_background || share(&self.missing) > SOMETHING_ELSE
     }
 
-    /// Whether the mask's outline follows what moves better than the turn's own: then differences are the turn's mistakes.
+    /// Whether the mask's outline follows what moves better than the turn's own.
     fn is_better_than_turn(&self) -> bool {
         self.outline > BETTER_OUTLINE * self.outline_of_turn
     }
@@ -67,9 +65,6 @@ impl ShapeCheck {
 }
 
 fn faults(shape: &ShapeCheck, most_leak: f64, most_region: f64) -> Vec<String> {
-    if shape.is_better_than_turn() {
-        return Vec::new();
-    }
     let mut faults = Vec::new();
     if !shape.contradicted && !shape.follows_what_moves() {
         faults.push(format!(
@@ -78,31 +73,25 @@ fn faults(shape: &ShapeCheck, most_leak: f64, most_region: f64) -> Vec<String> {
         ));
     }
     let area = shape.area_px as f64;
+    let most_missing = if shape.is_better_than_turn() {
+        f64::INFINITY
+    } else {
+        most_region
+    };
     let named = [
-        (
-            &shape.leaks,
-            most_leak,
-            "background in the mask",
-            "mark it black",
-        ),
+        (&shape.leaks, most_leak, "background in the mask", "black"),
         (
             &shape.missing,
-            most_region,
+            most_missing,
             "object outside the mask",
-            "mark it white",
-        ),
-        (
-            &shape.holes,
-            most_region,
-            "holes of the mask in the object",
-            "mark them white",
+            "white",
         ),
     ];
-    for (regions, most, what, remedy) in named {
+    for (regions, most, what, colour) in named {
         let px: u64 = regions.iter().map(|region| region.px).sum();
         if px as f64 > most * area {
             faults.push(format!(
-                "{what}, {px} pixels ({:.1} % of it), at {}: {remedy}, in --edit or in seeds",
+                "{what}, {px} pixels ({:.1} % of it), at {}: mark it {colour}, in --edit or in seeds",
                 100.0 * px as f64 / area,
                 places(regions)
             ));
@@ -129,8 +118,8 @@ mod tests {
     use super::*;
     use relit_data::geometry::Rect;
 
-    /// A mask of 1000 pixels, with parts of so many pixels that are leaks, missing, holes.
-    fn shape([leaks, missing, holes]: [u64; 3]) -> ShapeCheck {
+    /// A mask of 1000 pixels, with parts of so many pixels that are leaks, missing.
+    fn shape([leaks, missing]: [u64; 2]) -> ShapeCheck {
         let of = |px| {
             vec![DoubtfulRegion {
                 px,
@@ -145,16 +134,15 @@ mod tests {
             leaks: of(leaks),
             whiskers: Vec::new(),
             missing: of(missing),
-            holes: of(holes),
         }
     }
 
     #[test]
     fn background_in_a_mask_counts_sooner_than_what_it_lacks_and_whiskers_count_always() {
-        assert!(shape([2, 9, 9]).faults().is_empty());
-        assert_eq!(shape([4, 9, 9]).faults().len(), 1);
-        assert!(shape([4, 9, 9]).quick_faults().is_empty());
-        let mut with_whisker = shape([0; 3]);
+        assert!(shape([2, 9]).faults().is_empty());
+        assert_eq!(shape([4, 9]).faults().len(), 1);
+        assert!(shape([4, 9]).quick_faults().is_empty());
+        let mut with_whisker = shape([0; 2]);
         with_whisker.whiskers = with_whisker.leaks.clone();
         assert_eq!(with_whisker.faults().len(), 1);
         assert!(with_whisker.quick_faults().is_empty());
@@ -162,18 +150,16 @@ mod tests {
 
     #[test]
     fn a_mask_without_much_of_the_object_is_that_of_something_else() {
-        assert!(!shape([150, 150, 40]).is_of_another_object());
+        assert!(!shape([150, 190]).is_of_another_object());
         let beside = |leaks| ShapeCheck {
             outline: 0.5,
-            ..shape([leaks, 0, 0])
+            ..shape([leaks, 0])
         };
         assert!(!beside(190).is_of_another_object());
         assert!(beside(210).is_of_another_object());
         // A display on the object, whose outline is right, and a mask of the table.
-        assert!(!shape([400, 0, 0]).is_of_another_object());
-        assert!(shape([510, 0, 0]).is_of_another_object());
-        assert!(shape([0, 210, 0]).is_of_another_object());
-        assert!(shape([0, 0, 247]).is_of_another_object());
-        assert!(shape([0, 120, 120]).is_of_another_object());
+        assert!(!shape([400, 0]).is_of_another_object());
+        assert!(shape([510, 0]).is_of_another_object());
+        assert!(shape([0, 210]).is_of_another_object());
     }
 }

@@ -133,35 +133,27 @@ impl TurnField {
             // A white object may be overexposed as well.
             return self.mean_light(&beside) < NEARLY_WHITE;
         }
-        if !moves {
-            return false;
-        }
         let ground = self.ground(above, mask);
-        match self
+        let towards = self
             .temporal_evidence
-            .towards_ground(above, &beside, &ground)
-        {
-            Some(towards) => towards >= CLEARLY,
-            None => self.ends_without_edge(part, mask),
-        }
+            .towards_ground(above, &beside, &ground);
+        moves && towards.is_some_and(|towards| towards >= CLEARLY)
     }
 
     /// Whether the table is seen in a part of a mask that is like it by the model: it is as bright as the unshaded
-    /// table, and an edge between it and the rest of the mask persists over the turn, or no edge is where the mask ends.
-    /// A dark part of the object may look like the table, but has other edges.
+    /// table, and an edge between it and the rest of the mask persists over the turn. A dark part of the object may look
+    /// like the table, but has other edges.
     pub(crate) fn shows_table(&self, part: &Bitmap, mask: &Bitmap) -> bool {
-        let Some(table) = &self.seen_table else {
-            return self.ends_without_edge(part, mask);
-        };
         let edge = self.boundary(part, &mask.minus(part));
-        let has_edge = edge.is_none_or(|edge| edge >= SURE_EDGE);
-        has_edge && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
-            || self.ends_without_edge(part, mask)
+        self.seen_table.as_ref().is_some_and(|table| {
+            edge.is_none_or(|edge| edge >= SURE_EDGE)
+                && part.and(&table.like).share_in(&table.as_bright) > MOSTLY
+        })
     }
 
     /// Whether the edge of a part of a mask with the rest of the mask persists over the turn, and the one where the mask
     /// ends does not.
-    fn ends_without_edge(&self, part: &Bitmap, mask: &Bitmap) -> bool {
+    pub(crate) fn ends_without_edge(&self, part: &Bitmap, mask: &Bitmap) -> bool {
         let within = self.boundary(part, &mask.minus(part));
         let ends = self.boundary(part, &mask.inverted());
         within

@@ -82,7 +82,7 @@ fn larger_turns_are_cut_as_well() {
 }
 
 #[test]
-fn the_check_sees_a_hole_in_the_object_that_the_turns_own_mask_may_have_too() {
+fn the_check_sees_a_hole_in_the_object() {
     let scene = scene(Difficulty::Shade, SMALL, 24, SEED);
     let turn = scene.statistics();
     let mut holed = scene.truth.clone();
@@ -99,7 +99,7 @@ fn the_check_sees_a_hole_in_the_object_that_the_turns_own_mask_may_have_too() {
             .unwrap()
     };
     let found = shape(&holed);
-    assert_eq!(found.holes.len(), 1, "{found:?}");
+    assert_eq!(found.missing.len(), 1, "{found:?}");
     assert!(!found.faults().is_empty());
     assert!(
         shape(&scene.truth).faults().is_empty(),
@@ -225,7 +225,7 @@ fn background_in_a_mask_object_outside_and_holes_are_found_by_what_they_show() {
     assert!(half.missing.iter().any(|part| part.px > 60), "{half:?}");
     let hole = |x: u32, y: u32| (f64::from(x) - 46.0).hypot(f64::from(y) - 32.0) <= 6.0;
     let holed = shape(&|x, y| in_disc(x, y) && !hole(x, y));
-    assert!(holed.holes.iter().any(|part| part.px > 60), "{holed:?}");
+    assert!(holed.missing.iter().any(|part| part.px > 60), "{holed:?}");
     for wrong in [leaking, half, holed] {
         assert!(!wrong.faults().is_empty(), "{wrong:?}");
     }
