@@ -445,7 +445,7 @@ def measure(arguments):
     for kind in ["", *KINDS]:
         some = [own for name, own, _ in judged if re.fullmatch(rf"\d+-{kind}(-(?!room-).*)?" if kind else ".*", name)]
         if some:
-            print(f"| {len(some)} {kind} | {mean(some)} | {min(some):.3f} | {sum(value >= 0.97 for value in some)} |")
+            print(f"| {len(some)} {kind or 'all'} | {mean(some)} | {min(some):.3f} | {sum(value >= 0.97 for value in some)} |")
     for which, title in enumerate(("right masks", "faults")) if arguments.check else ():
         verdicts = [turn[which] for _, _, turn in judged]
         for what in ["", *dict.fromkeys(what for turn in verdicts for what in turn)]:
@@ -453,7 +453,7 @@ def measure(arguments):
             turns = [turn for turn in turns if turn]
             counts = {says: sum(turn.count(says) for turn in turns) for says in ("wrong", "fits", "unknown")}
             # The masks of a turn are not independent: the standard error is that of the turns.
-            print(f"{title} {what}: {counts}; wrong by turns {mean([np.mean([says == 'wrong' for says in turn]) for turn in turns])}")
+            print(f"{title}, {what or 'all'}: {counts}; wrong by turns {mean([np.mean([says == 'wrong' for says in turn]) for turn in turns])}")
 
 
 def main():

@@ -130,11 +130,7 @@ impl<'a> MaskCheck<'a> {
             clear(turn, part, mask) == Some(true)
         });
         let whiskers = self.whiskers(&own);
-        let missing = if moves {
-            self.shown(&missing, TurnField::belongs)
-        } else {
-            missing.minus(&missing)
-        };
+        let missing = self.shown(&missing, |turn, part, mask| turn.belongs(part, mask, moves));
         let undisputed = leaks.count() + missing.count() + undecided.count() == 0;
         let least = self.mask.count() as f64 * SMALL;
         // Where hardly anything moves, no outline follows it.

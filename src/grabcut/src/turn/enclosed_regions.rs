@@ -168,19 +168,25 @@ impl TurnField {
         pixels.map(|(_, light)| light).sum::<f32>() / part.count().max(1) as f32
     }
 
-    /// Whether a part outside the object shows that it belongs to it: it does not move, is neither room nor table,
-    /// becomes brighter with the object, and its outline is stronger where it does not touch it.
-    pub(crate) fn belongs(&self, part: &Bitmap, object: &Bitmap) -> bool {
+    /// Whether a part outside the object shows that it belongs to it: nothing separates them; or it does not move,
+    /// is neither room nor table, becomes brighter with the object, and its outline is stronger where it does not touch
+    /// it. In a room in which nothing moves, only the edge counts.
+    pub(crate) fn belongs(&self, part: &Bitmap, object: &Bitmap, moves: bool) -> bool {
+        let edge = self.boundary(part, object);
+        if edge.is_some_and(|edge| edge <= NO_EDGE * self.outline(object)) {
+            return true;
+        }
         let ground = self.ground(part, object);
         let beside = self.beside(part, object);
         let known =
             part.share_in(&self.backdrop) > MOSTLY || part.share_in(&self.table.surface) > MOSTLY;
-        if known || self.temporal_evidence.moves(part, &beside, &ground) != Some(false) {
+        let stands = self.temporal_evidence.moves(part, &beside, &ground) == Some(false);
+        if known || !moves || !stands {
             return false;
         }
         let outside = object.or(part).inverted();
-        let (within, without) = (self.boundary(part, object), self.boundary(part, &outside));
-        let joins = within.is_some_and(|within| within <= without.unwrap_or(f32::INFINITY));
+        let without = self.boundary(part, &outside).unwrap_or(f32::INFINITY);
+        let joins = edge.is_some_and(|edge| edge <= without);
         joins && self.temporal_evidence.together(part, &beside)
     }
 

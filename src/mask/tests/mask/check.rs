@@ -120,7 +120,7 @@ fn masks_of_another_shape_are_wrong_with_the_place_of_what_differs() {
     wrong(&|x, y| disc(x, y) && x < 52.0, "missing");
     wrong(
         &|x, y| disc(x, y) && (x - 46.0).hypot(y - 32.0) > 6.0,
-        "holes",
+        "missing",
     );
 }
 
