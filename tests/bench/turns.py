@@ -4,7 +4,7 @@
     python turns.py measure relit-mask FOLDER
 
 MESHES holds `.obj` and archives of Sweet Home 3D (`.sh3f`), PANORAMAS `.hdr`. The kinds take turns: objects with openings,
-black ones, white ones, and objects before a white room. A third are built of bars, boxes and rings. They stand on a black,
+black ones, white ones, and objects before a white room. Two fifths are built of bars, boxes and rings. They stand on a black,
 slightly glossy disc, lit by a panorama through a light transport of 360 directions (shadows, and the object's light
 on the table). FOLDER/NUMBER-KIND-OBJECT gets `video.mkv` (Motion JPEG, one turn) and `mask_gt.png`, an antialiased mask.
 `ffmpeg` writes the videos.
@@ -344,6 +344,8 @@ def render(kind, name, mesh, path, folder, rng):
             picture = np.clip(picture, 0, 1)
             coded = np.where(picture < 0.0031308, 12.92 * picture, 1.055 * picture ** (1 / 2.4) - 0.055)
             coder.stdin.write(np.round(coded * 255).astype(np.uint8).tobytes())
+    if coder.returncode:
+        raise SystemExit(f"ffmpeg could not write {folder / 'video.mkv'}")
 
 
 def paint(kind, points, parts, rng):
@@ -426,7 +428,7 @@ def judge(program, session, check):
         path = f"{folder}/mask.png"
         made = subprocess.run([program, session, "--auto", "--force", "-o", path], capture_output=True).returncode == 0
         own = overlap(read_mask(path), truth) if made else 0.0
-        masks = planted(truth, np.random.default_rng(int(session.name[:4]))) if check else ({}, {})
+        masks = planted(truth, np.random.default_rng(int(session.name.split("-")[0]))) if check else ({}, {})
         verdicts = [{what: verdict(program, session, mask, path) for what, mask in some.items()} for some in masks]
     print(f"{session.name}: {own:.3f}", *(f"{what} {says}" for some in verdicts for what, says in some.items()), sep=", ", flush=True)
     return session.name, own, verdicts

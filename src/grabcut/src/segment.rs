@@ -252,27 +252,12 @@ fn by_hints(
             true,
         ),
     };
-    let mut raw = pyramid.refined(cut, effort);
-    if rect.is_none() && !settings.keep_all {
-        raw = marked_parts(&raw, hints.marks());
-    }
+    let raw = pyramid.refined(cut, effort);
     let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME);
     if !is_plausible {
         mask.warnings.push(IMPLAUSIBLE.to_owned());
     }
     Ok(mask)
-}
-
-/// The parts with marks of the object: nothing else says that there is more of it.
-fn marked_parts(object: &Bitmap, marks: &[Mark]) -> Bitmap {
-    let parts = object.components(Connectivity::Eight);
-    let mut is_marked = vec![false; parts.list.len()];
-    for (at, &mark) in marks.iter().enumerate() {
-        if let Some(part) = parts.at(at).filter(|_| mark == Mark::Object) {
-            is_marked[part] = true;
-        }
-    }
-    object.map(|at, _| parts.at(at).is_some_and(|part| is_marked[part]))
 }
 
 /// A coarse cut, and how it is judged.
@@ -472,15 +457,6 @@ mod tests {
         assert_eq!(found[0], Label::Object);
         assert_eq!(found[9], Label::ProbablyBackground);
         assert_eq!([found[44], found[4]], [Label::ProbablyObject; 2]);
-    }
-
-    #[test]
-    fn parts_without_marks_of_the_object_are_dropped() {
-        let object = Bitmap::drawn(&["##...", "##.##", "...##"]);
-        let mut marks = vec![Mark::Unknown; 15];
-        marks[9] = Mark::Object;
-        let wanted = Bitmap::drawn(&[".....", "...##", "...##"]);
-        assert_eq!(marked_parts(&object, &marks), wanted);
     }
 
     #[test]

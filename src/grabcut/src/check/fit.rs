@@ -96,7 +96,7 @@ impl<'a> MaskCheck<'a> {
 
     /// Compares the mask's shape with that which the turn shows on `frame`, the one on which the mask was
     /// made, with this effort. `None` if the turn says nothing: what it shows alone is not an object, or hardly
-    /// anything moves and the table is not seen in the mask.
+    /// anything moves and nothing wrong is found.
     ///
     /// # Errors
     /// As [`segment_with`] a turn and no hints.

@@ -51,7 +51,8 @@ impl ShapeCheck {
         } else {
             SOMETHING_ELSE
         };
-        share(&self.leaks) > most_background || share(&self.missing) > SOMETHING_ELSE
+        let misses = !self.is_better_than_turn() && share(&self.missing) > SOMETHING_ELSE;
+        share(&self.leaks) > most_background || misses
     }
 
     /// Whether the mask's outline follows what moves better than the turn's own.

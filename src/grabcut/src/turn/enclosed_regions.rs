@@ -143,7 +143,7 @@ impl TurnField {
     /// Whether the table is seen in a part of a mask that is like it by the model: it is as bright as the unshaded
     /// table, and an edge between it and the rest of the mask persists over the turn. A dark part of the object may look
     /// like the table, but has other edges.
-    pub(crate) fn shows_table(&self, part: &Bitmap, mask: &Bitmap) -> bool {
+    fn shows_table(&self, part: &Bitmap, mask: &Bitmap) -> bool {
         let edge = self.boundary(part, &mask.minus(part));
         self.seen_table.as_ref().is_some_and(|table| {
             edge.is_none_or(|edge| edge >= SURE_EDGE)
@@ -158,7 +158,7 @@ impl TurnField {
         let ends = self.boundary(part, &mask.inverted());
         within
             .zip(ends)
-            .is_some_and(|(within, ends)| ends <= NO_EDGE * within)
+            .is_some_and(|(within, ends)| ends < NO_EDGE * within)
     }
 
     /// The average brightness L of a part.
@@ -168,20 +168,21 @@ impl TurnField {
         pixels.map(|(_, light)| light).sum::<f32>() / part.count().max(1) as f32
     }
 
-    /// Whether a part outside the object shows that it belongs to it: nothing separates them; or it does not move,
-    /// is neither room nor table, becomes brighter with the object, and its outline is stronger where it does not touch
+    /// Whether a part outside the object, neither room nor table, shows that it belongs to it: nothing separates them; or
+    /// it does not move, becomes brighter with the object, and its outline is stronger where it does not touch
     /// it. In a room in which nothing moves, only the edge counts.
     pub(crate) fn belongs(&self, part: &Bitmap, object: &Bitmap, moves: bool) -> bool {
+        if part.share_in(&self.backdrop) > MOSTLY || part.share_in(&self.table.surface) > MOSTLY {
+            return false;
+        }
         let edge = self.boundary(part, object);
-        if edge.is_some_and(|edge| edge <= NO_EDGE * self.outline(object)) {
+        if edge.is_some_and(|edge| edge < NO_EDGE * self.outline(object)) {
             return true;
         }
         let ground = self.ground(part, object);
         let beside = self.beside(part, object);
-        let known =
-            part.share_in(&self.backdrop) > MOSTLY || part.share_in(&self.table.surface) > MOSTLY;
         let stands = self.temporal_evidence.moves(part, &beside, &ground) == Some(false);
-        if known || !moves || !stands {
+        if !moves || !stands {
             return false;
         }
         let outside = object.or(part).inverted();

@@ -33,7 +33,7 @@ use crate::{Effort, Hints};
 pub const MIN_TURN_FRAMES: usize = 4;
 /// Frames that are sampled of a turn.
 pub const TURN_FRAMES: usize = 32;
-/// The table's model is learned so many times, each time from a better cut.
+/// The table's model is learned at most so many times, each time from a better cut.
 const LEARNED: usize = 5;
 /// Frames are halved until they have at most so many pixels.
 const MAX_PIXELS: usize = 600_000;
@@ -122,9 +122,9 @@ pub struct TurnStatistics {
 }
 
 impl TurnStatistics {
-    /// Looks at the frames of a turn.
+    /// Looks at the frames of a turn. A draft learns the table only once.
     #[must_use]
-    pub fn new(turn: &TurnFrames) -> Self {
+    pub fn new(turn: &TurnFrames, effort: Effort) -> Self {
         let colours = LabTable::new();
         let mut fine = TurnField::new(&turn.frames, &colours);
         let mut coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
@@ -137,9 +137,18 @@ impl TurnStatistics {
         let mut model = None;
         let before =
             [Some(&fine), coarse.as_ref()].map(|field| field.map(TurnField::without_table));
-        for round in 0..LEARNED {
+        let rounds = match effort {
+            Effort::Draft => 1,
+            Effort::Fine => LEARNED,
+        };
+        for round in 0..rounds {
             if round > 0 {
-                object = own_cut(&fine, coarse.as_ref()).or(object);
+                let better =
+                    own_cut(&fine, coarse.as_ref()).filter(|cut| Some(cut) != object.as_ref());
+                if better.is_none() {
+                    break;
+                }
+                object = better;
             }
             let Some(learned) = object
                 .as_ref()
@@ -661,7 +670,7 @@ mod tests {
                 image::Rgb([level; 3])
             }));
         }
-        let field = TurnStatistics::new(&turn).fine;
+        let field = TurnStatistics::new(&turn, Effort::Fine).fine;
         let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
         let outline = field.outline(&all.map(|at, _| at / 80 < 30));
         let shadow = field.outline(&all.map(|at, _| at % 80 < 40));

@@ -16,7 +16,7 @@ const MIN_PART: f64 = 0.01;
 /// It comes as near to the lower border as this share of the height, or is this share of the width wide.
 const FOOT: f64 = 0.03;
 const WIDE: f64 = 0.35;
-/// The object may divide the table: another part of it is at least this share of that large, and differs at most so much
+/// The object may divide the table: another part of it is at least this share of the least size, and differs at most so much
 /// in brightness and colour, as features.
 const JOINED: f64 = 0.1;
 const PART_LIGHT: f32 = 2.0;
@@ -65,9 +65,10 @@ pub(crate) fn find_turntable(
         }
     }
     let least = (width * height) as f64 * MIN_PART;
+    let (below, components) = (&below, &components);
     let parts = |least: f64| {
         let large = components.list.iter().enumerate();
-        let large = large.filter(move |(_, part)| part.area as f64 >= least);
+        let large = large.filter(move |&(at, part)| below[at] > 0 && part.area as f64 >= least);
         large.map(|(at, _)| (at, inner.map(|pixel, _| components.at(pixel) == Some(at))))
     };
     // A dark floor of the room is as far below, but shows something else all the time.

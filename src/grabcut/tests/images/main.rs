@@ -227,7 +227,7 @@ fn turn_frame(at: u32) -> RgbImage {
 fn statistics(frames: u32) -> TurnStatistics {
     let mut turn = TurnFrames::new(WIDTH, HEIGHT);
     (0..frames).for_each(|at| turn.push(&turn_frame(at)));
-    TurnStatistics::new(&turn)
+    TurnStatistics::new(&turn, Effort::Fine)
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
 fn a_turn_without_any_frame_is_refused() {
     let alone = segment_turn(&turn_frame(0), &statistics(0), &Hints::default());
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
-    let of_nothing = TurnStatistics::new(&TurnFrames::new(0, 0));
+    let of_nothing = TurnStatistics::new(&TurnFrames::new(0, 0), Effort::Fine);
     let alone = segment_turn(&turn_frame(0), &of_nothing, &Hints::default());
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
 }
@@ -263,7 +263,12 @@ fn a_turn_without_any_frame_is_refused() {
 fn a_video_in_which_nothing_moves_gives_a_warning() {
     let mut still = TurnFrames::new(WIDTH, HEIGHT);
     (0..8).for_each(|_| still.push(&disc()));
-    let mask = segment_turn(&disc(), &TurnStatistics::new(&still), &around()).unwrap();
+    let mask = segment_turn(
+        &disc(),
+        &TurnStatistics::new(&still, Effort::Fine),
+        &around(),
+    )
+    .unwrap();
     assert!(disc_share(&mask.image) > 0.95);
     assert!(warns(&mask, "video"), "{:?}", mask.warnings);
 }

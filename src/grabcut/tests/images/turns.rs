@@ -210,7 +210,7 @@ fn background_in_a_mask_object_outside_and_holes_are_found_by_what_they_show() {
     let frames = still_disc();
     let mut turn = TurnFrames::new(WIDTH, HEIGHT);
     frames.iter().for_each(|frame| turn.push(frame));
-    let turn = TurnStatistics::new(&turn);
+    let turn = TurnStatistics::new(&turn, Effort::Fine);
     let shape = |inside: &dyn Fn(u32, u32) -> bool| {
         let mask = seeds_image(|x, y| if inside(x, y) { 255 } else { 0 });
         let check = MaskCheck::new(&mask, &turn).unwrap();
