@@ -4,10 +4,11 @@
     python turns.py measure relit-mask FOLDER
 
 MESHES holds `.obj` and archives of Sweet Home 3D (`.sh3f`), PANORAMAS `.hdr`. The kinds take turns: objects with openings,
-black ones, white ones, and objects before a white room. Two fifths are built of bars, boxes and rings. They stand on a black,
+black ones, white ones, and objects before a white room. A third are built of bars, boxes and rings. They stand on a dark,
 slightly glossy disc, lit by a panorama through a light transport of 360 directions (shadows, and the object's light
 on the table). FOLDER/NUMBER-KIND-OBJECT gets `video.mkv` (Motion JPEG, one turn) and `mask_gt.png`, an antialiased mask.
-`ffmpeg` writes the videos.
+`ffmpeg` writes the videos. turn_network.py learns from the same turns, but from other objects and panoramas: those here
+are held out by a hash of their names.
 """
 
 import argparse
@@ -17,16 +18,23 @@ import re
 import subprocess
 import tempfile
 import zipfile
+import zlib
 
 import cv2
 import numpy as np
 
-WIDTH, HEIGHT, FINE = 640, 480, 2
+SIZE, FINE = (640, 480), 2
 FRAMES = 150
 DIRECTIONS = 360
 KINDS = ["openings", "black", "white-room", "white"]
 BUILT = ["chair", "rack", "mug", "rings", "basket", "lamp", "arch"]
 OPEN = re.compile("chair|stool|shelf|rack|bike|cart|ladder|basket|table|lamp|wheel", re.I)
+# What stands or hangs on nothing.
+NOT_ON_TABLES = re.compile("window|door|wall|stair|fence|curtain|blind|roof|carpet|rug|picture|poster|mirror|frame|switch|outlet|floor", re.I)
+# Held out: one object in seven, by a hash of its name, those whose licence allows no training, and five panoramas.
+ONE_IN = 7
+KEPT_APART = {"armadillo", "boot", "bunny", "demosthenes-low-res", "nefertiti-lowres", "spot", "springer"}
+KEPT_ROOMS = {"autoshop_01", "brown_photostudio_02", "kloppenheim_05", "noon_grass", "studio_small_05"}
 ROOM, TABLE, OBJECT = range(3)
 
 
@@ -53,7 +61,7 @@ def sources(folder):
     found = {path.stem: lambda path=path: obj(path.read_text().splitlines()) for path in sorted(folder.rglob("*.obj"))}
     for path in sorted(folder.rglob("*.sh3f")):
         with zipfile.ZipFile(path) as archive:
-            names = [name for name in archive.namelist() if name.endswith(".obj") and OPEN.search(name)]
+            names = [name for name in archive.namelist() if name.endswith(".obj") and not NOT_ON_TABLES.search(name)]
 
         def read(path=path, name=None):
             with zipfile.ZipFile(path) as archive:
@@ -228,152 +236,285 @@ def sampled(panorama, at, turn):
     return cv2.remap(padded, *places, cv2.INTER_LINEAR)
 
 
-def read_panorama(path, kind, rng):
-    light = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., :3].astype(np.float32)
+def is_held_out(name):
+    return name in KEPT_APART or zlib.crc32(name.encode()) % ONE_IN == 0
+
+
+def panoramas(folder, held_out):
+    """The panoramas of a folder that are held out, or the others."""
+    found = sorted(folder.rglob("*.hdr")) + sorted(folder.rglob("*.exr"))
+    return [path for path in found if (path.stem in KEPT_ROOMS) == held_out]
+
+
+def read_panorama(path):
+    if path.suffix == ".exr":
+        import OpenEXR
+
+        with OpenEXR.File(str(path)) as file:
+            channels = file.channels()
+            stacked = next((channels[name].pixels for name in ("RGB", "RGBA") if name in channels), None)
+            light = stacked if stacked is not None else np.stack([channels[name].pixels for name in "RGB"], -1)
+        light = light[..., 2::-1]
+    else:
+        light = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., :3]
+    light = np.nan_to_num(light.astype(np.float32), posinf=3000)
     light = np.minimum(cv2.resize(light, (1024, 512), interpolation=cv2.INTER_AREA), 3000)
-    light /= light[100:412].mean()
-    if "white" in kind and (kind == "white-room" or rng.random() < 0.5):
+    return light / max(light[100:412].mean(), 1e-4)
+
+
+class View:
+    """An object on its table, seen by a camera: what of it each pixel shows, and from where that sees the sky."""
+
+    def __init__(self, mesh, size, rng):
+        width, height = self.size = size
+        vertices, faces, parts = mesh
+        vertices = vertices - (vertices.max(0) + vertices.min(0)) / 2
+        yaw = rng.uniform(0, 6.28)
+        vertices = vertices @ np.array([[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]])
+        vertices /= max(np.hypot(vertices[:, 0], vertices[:, 2]).max(), rng.uniform(0.5, 0.7) * np.ptp(vertices[:, 1]))
+        vertices[:, 1] -= vertices[:, 1].min() - 1e-3
+        disc = rng.uniform(1.05, 1.8) if rng.random() < 0.75 else rng.uniform(1.8, 3.2)
+        thick = rng.uniform(0.02, 0.25)
+        edges = vertices[faces[:, 1:]] - vertices[faces[:, :1]]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        chosen = rng.choice(len(faces), 80_000, p=area / area.sum())
+        share = rng.dirichlet([1, 1, 1], len(chosen))
+        surface = (vertices[faces[chosen]] * share[..., None]).sum(1).astype(np.float32)
+        base = turned([[0, 0], [disc, 0], [disc, -thick], [0, -thick]], 0, 160)
+        whole = np.concatenate([vertices, base[0]])
+        triangles = np.concatenate([faces, base[1] + len(vertices)])
+
+        # The camera looks down at the object.
+        pitch, distance = np.radians(rng.uniform(6, 42)), rng.uniform(4.5, 10)
+        back = np.array([0, np.sin(pitch), np.cos(pitch)])
+        axes = np.stack([[1, 0, 0], -np.cross(back, [1, 0, 0]), -back], 1)
+        eye = distance * back + [0, 0.42 * vertices[:, 1].max(), 0]
+        seen = (whole - eye) @ axes
+        if seen[:, 2].min() < 0.3:
+            raise ValueError("part of the object is behind the camera")
+        flat = seen[: len(vertices), :2] / seen[: len(vertices), 2:]
+        zoom = rng.uniform(0.4, 0.85) * min(width / np.ptp(flat[:, 0]), height / np.ptp(flat[:, 1]))
+        free = np.array(size) - zoom * np.ptp(flat, axis=0)
+        middle = np.array([width / 2, height * rng.uniform(0.44, 0.5)]) + rng.uniform(-0.17, 0.17, 2) * free
+        middle -= zoom * (flat.max(0) + flat.min(0)) / 2
+        places = np.concatenate([FINE * (zoom * seen[:, :2] / seen[:, 2:] + middle), 1 / seen[:, 2:]], 1)
+        fine = (FINE * width, FINE * height)
+        shown, shares = raster(places, triangles, fine)
+
+        # A point of the object and one of the table for each pixel that shows them.
+        is_object = (shown >= 0) & (shown < len(faces))
+        label = np.where(is_object, OBJECT, np.where(shown >= 0, TABLE, ROOM))
+        shares_of = (np.float32(label == k).reshape(fine[1], fine[0]) for k in range(3))
+        self.cover = np.stack([cv2.resize(fully, size, interpolation=cv2.INTER_AREA) for fully in shares_of], -1)
+        hit = np.flatnonzero(shown >= 0)
+        target = hit // fine[0] // FINE * width + hit % fine[0] // FINE
+        _, first = np.unique(target * 3 + label[hit], return_index=True)
+        hit, self.target = hit[first], target[first]
+        self.of_table = ~is_object[hit]
+        self.part_cover = self.cover.reshape(-1, 3)[self.target, label[hit]]
+        weight = shares[hit] * places[triangles[shown[hit]], 2]
+        weight /= weight.sum(1, keepdims=True)
+        points = (whole[triangles[shown[hit]]] * weight[..., None]).sum(1)
+        flat_normal, corner = normals(whole, triangles)
+        normal = unit((corner[shown[hit]] * weight[..., None]).sum(1))
+        towards = unit(eye - points)
+        normal *= np.where((flat_normal[shown[hit]] * towards).sum(1, keepdims=True) < 0, -1, 1)
+        self.points, self.normal, self.towards = (array.astype(np.float32) for array in (points, normal, towards))
+        self.parts = np.where(self.of_table, -1, parts[np.minimum(shown[hit], len(faces) - 1)])
+        self.ways = directions().astype(np.float32)
+        above = self.points + np.float32(0.01) * self.normal
+        self.lit = np.stack([visible(above, way, surface, disc, 160) for way in self.ways], 1)
+        across, down = np.meshgrid(np.arange(width) + 0.5 - middle[0], np.arange(height) + 0.5 - middle[1])
+        self.rays = unit(np.stack([across / zoom, down / zoom, np.ones_like(across)], -1) @ axes.T).astype(np.float32)
+
+    def radiance(self, paint, sky):
+        """The light of object and table in each frame, from the sky's by direction and frame."""
+        many = sky.shape[1]
+        upper = np.where(self.ways[:, 1] > 0, np.float32(1 / DIRECTIONS), 0)
+        # A hidden direction above the table shows the object in its average light.
+        bounced = paint.bounce * np.einsum("kfc,k->fc", sky, upper) * paint.albedo[~self.of_table].mean(0)
+        facing = (self.normal * self.towards).sum(1)
+        mirrored = 2 * facing[:, None] * self.normal - self.towards
+        fresnel = paint.gloss + (1 - paint.gloss) * np.clip(1 - facing, 0, 1) ** 5 * paint.grazing
+        light = sky.reshape(len(self.ways), -1)
+        result = np.zeros((self.size[0] * self.size[1], many, 3), np.float32)
+        for some in np.array_split(np.arange(len(self.points)), 8):
+            diffuse = np.clip(self.normal[some] @ self.ways.T, 0, None) * np.float32(4 / DIRECTIONS)
+            lobe = np.exp(np.log(np.clip(mirrored[some] @ self.ways.T, 1e-6, None)) * paint.power[some, None])
+            lobe *= (fresnel[some] / np.maximum(lobe.sum(1), 1e-9))[:, None].astype(np.float32)
+            free = self.lit[some].astype(np.float32)
+            hidden = (1 - free) * (self.ways[:, 1] > 0)
+            albedo, tint = (array[some, None].astype(np.float32) for array in (paint.albedo, paint.tint))
+            of_paint = ((diffuse * free) @ light).reshape(-1, many, 3) + (diffuse * hidden).sum(1)[:, None, None] * bounced
+            of_gloss = ((lobe * free) @ light).reshape(-1, many, 3) * tint + (lobe * hidden).sum(1)[:, None, None] * bounced
+            shown = self.part_cover[some, None, None] * (albedo * of_paint + of_gloss)
+            # A pixel may show both.
+            for chosen in (self.of_table[some], ~self.of_table[some]):
+                result[self.target[some][chosen]] += shown[chosen]
+        return result
+
+
+class Paint:
+    """Albedo, gloss and tint of the gloss of a view's points."""
+
+    def __init__(self, kind, view, rng):
+        on_object, points = ~view.of_table, view.points
+        many = view.parts.max() + 1
+        self.kind = kind if kind in ("black", "white") else str(rng.choice(["mixed", "black", "white", "grey"], p=[0.42, 0.22, 0.22, 0.14]))
+        self.bounce, self.grazing = rng.uniform(0.3, 1), rng.uniform(0.05, 0.3)
+        table = rng.uniform(0.012, 0.07) * rng.uniform(0.9, 1.1, 3)
+        self.albedo = table * np.where(points[:, 1:2] < -1e-4, rng.choice([0.7, 1, 1, 4]), 1)
+        if rng.random() < 0.25:
+            # Marks and dust on the table.
+            waves = np.sin(points @ rng.normal(0, 9, 3))[:, None] > rng.uniform(0.3, 0.95)
+            self.albedo = self.albedo * np.where(waves, rng.uniform(0.7, 1.5), 1)
+        colours = self.colours(many, rng)[view.parts[on_object]]
+        if rng.random() < 0.6:
+            colours = self.patterned(colours, points[on_object], rng)
+        colours = np.clip(colours, 0.008, 0.92)
+        gloss, power, self.tint = rng.uniform(0, 0.04), rng.uniform(8, 80), np.ones_like(self.albedo)
+        if rng.random() < 0.3:
+            gloss, power = rng.uniform(0.04, 0.25), rng.uniform(20, 250)
+        if rng.random() < 0.1:
+            gloss, power = rng.uniform(0.4, 0.8), rng.uniform(10, 120)
+            self.tint[on_object] = colours.mean(0) / max(colours.mean(), 1e-3)
+            colours = 0.1 * colours
+        self.albedo[on_object] = colours
+        of_table = (rng.uniform(0, 0.02), rng.uniform(15, 60)) if rng.random() < 0.6 else (rng.uniform(0.02, 0.08), rng.uniform(60, 300))
+        self.gloss = np.where(view.of_table, of_table[0], gloss)
+        self.power = np.where(view.of_table, of_table[1], power).astype(np.float32)
+
+    def colours(self, many, rng):
+        if self.kind == "black":
+            colours = rng.uniform(0.015, 0.07, (many, 1)) * rng.uniform(0.85, 1.15, (many, 3))
+        elif self.kind == "white":
+            colours = rng.uniform(0.6, 0.88, (many, 1)) * rng.uniform(0.94, 1, (many, 3))
+        elif self.kind == "grey":
+            colours = rng.uniform(0.05, 0.6, (many, 1)) * rng.uniform(0.93, 1.07, (many, 3))
+        else:
+            colours = rng.uniform(0.05, 0.8, (many, 3)) * rng.uniform(0.3, 1, (many, 1))
+        if self.kind != "mixed" and rng.random() < 0.3:
+            colours[rng.integers(many)] = rng.uniform(0.03, 0.8, 3)
+        return colours
+
+    def patterned(self, colours, points, rng):
+        scale = rng.uniform(2, 14)
+        waves = sum(np.sin(points @ rng.normal(0, scale * (1 + 0.7 * k), 3) + rng.uniform(0, 6)) for k in range(rng.integers(1, 4)))
+        edge = (waves - rng.uniform(-0.3, 1.4)) / rng.choice([0.02, 0.3])
+        share = 1 / (1 + np.exp(-np.clip(edge, -30, 30)))[:, None]
+        other = rng.uniform(0.03, 0.8, 3) * (0.4 if self.kind == "black" else 1)
+        if rng.random() < 0.6:
+            other = colours * rng.uniform(0.4, 1)
+        return colours * (1 - share) + other * share
+
+
+def room_light(path, is_white, rng):
+    """A panorama, mirrored, tinted or turned; or a white room with some of its light."""
+    light = read_panorama(path)
+    if rng.random() < 0.5:
+        light = light[:, ::-1]
+    if rng.random() < 0.3:
+        light = light * rng.uniform(0.7, 1.3, 3).astype(np.float32)
+    if is_white:
         # Walls of one brightness, and some of the panorama's light on the object.
-        walls = rng.uniform(0.95, 1.05, 3).astype(np.float32)
-        light = walls * (1 + rng.uniform(0, 0.15) * np.tanh(light - 1)) + np.where(light > 8, light * 0.5, 0)
-    return light
+        walls = rng.uniform(0.92, 1.08, 3).astype(np.float32)
+        light = walls * (1 + rng.uniform(0, 0.3) * np.tanh(light - 1)) + np.where(light > 8, light * 0.5, 0)
+    return np.roll(light, rng.integers(light.shape[1]), 1)
 
 
-def render(kind, name, mesh, path, folder, rng):
-    vertices, faces, parts = mesh
-    vertices = vertices - (vertices.max(0) + vertices.min(0)) / 2
-    yaw = rng.uniform(0, 6.28)
-    vertices = vertices @ np.array([[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]])
-    vertices /= max(np.hypot(vertices[:, 0], vertices[:, 2]).max(), 0.62 * np.ptp(vertices[:, 1]))
-    vertices[:, 1] -= vertices[:, 1].min() - 1e-3
-    tall, disc, thick = vertices[:, 1].max(), rng.uniform(1.15, 1.7), rng.uniform(0.04, 0.12)
-    edges = vertices[faces[:, 1:]] - vertices[faces[:, :1]]
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    chosen = rng.choice(len(faces), 150_000, p=area / area.sum())
-    share = rng.dirichlet([1, 1, 1], len(chosen))
-    surface = (vertices[faces[chosen]] * share[..., None]).sum(1).astype(np.float32)
-    base = turned([[0, 0], [disc, 0], [disc, -thick], [0, -thick]], 0, 160)
-    whole = np.concatenate([vertices, base[0]])
-    triangles = np.concatenate([faces, base[1] + len(vertices)])
-
-    # The camera looks at the object from above and far away.
-    pitch, distance = np.radians(rng.uniform(12, 32)), rng.uniform(6, 9)
-    back = np.array([0, np.sin(pitch), np.cos(pitch)])
-    axes = np.stack([[1, 0, 0], -np.cross(back, [1, 0, 0]), -back], 1)
-    eye = distance * back + [0, 0.42 * tall, 0]
-    seen = (whole - eye) @ axes
-    flat = seen[:len(vertices), :2] / seen[:len(vertices), 2:]
-    zoom = rng.uniform(0.6, 0.8) * min(WIDTH / np.ptp(flat[:, 0]), HEIGHT / np.ptp(flat[:, 1]))
-    middle = np.array([WIDTH / 2, HEIGHT * rng.uniform(0.44, 0.5)]) - zoom * (flat.max(0) + flat.min(0)) / 2
-    places = np.concatenate([FINE * (zoom * seen[:, :2] / seen[:, 2:] + middle), 1 / seen[:, 2:]], 1)
-    fine = (FINE * WIDTH, FINE * HEIGHT)
-    shown, shares = raster(places, triangles, fine)
-
-    # A point of the object and one of the table for each pixel that shows them.
-    is_object = (shown >= 0) & (shown < len(faces))
-    label = np.where(is_object, OBJECT, np.where(shown >= 0, TABLE, ROOM))
-    shares_of = (np.float32(label == k).reshape(fine[1], fine[0]) for k in range(3))
-    cover = [cv2.resize(fully, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA) for fully in shares_of]
-    hit = np.flatnonzero(shown >= 0)
-    target = hit // fine[0] // FINE * WIDTH + hit % fine[0] // FINE
-    _, first = np.unique(target * 3 + label[hit], return_index=True)
-    hit, target = hit[first], target[first]
-    of_table, part_cover = ~is_object[hit], np.stack(cover, -1).reshape(-1, 3)[target, label[hit]]
-    weight = shares[hit] * places[triangles[shown[hit]], 2]
-    weight /= weight.sum(1, keepdims=True)
-    points = (whole[triangles[shown[hit]]] * weight[..., None]).sum(1)
-    flat_normal, corner = normals(whole, triangles)
-    normal = unit((corner[shown[hit]] * weight[..., None]).sum(1))
-    view = unit(eye - points)
-    normal *= np.where((flat_normal[shown[hit]] * view).sum(1, keepdims=True) < 0, -1, 1)
-    albedo = np.full((len(hit), 3), rng.uniform(0.02, 0.04)) * np.where(points[:, 1:2] < -1e-4, rng.choice([0.7, 1, 4]), 1)
-    albedo[~of_table] = paint(kind, points[~of_table], parts[shown[hit][~of_table]], rng)
-    gloss = np.where(of_table, rng.uniform(0, 0.02), rng.uniform(0, 0.04))
-    power = np.where(of_table, rng.uniform(15, 60), rng.uniform(8, 80)).astype(np.float32)
-    fresnel = gloss + (1 - gloss) * np.clip(1 - (normal * view).sum(1), 0, 1) ** 5 * 0.12
-    points, normal, view = (array.astype(np.float32) for array in (points, normal, view))
-
-    light = read_panorama(path, kind, rng)
-    ways = directions().astype(np.float32)
+def pictures(view, kind, path, many, rng):
+    """The frames of a turn, one after another, and each row by row 8 bits of blue, green and red."""
+    width, height = view.size
+    paint = Paint(kind, view, rng)
+    is_white = kind == "white-room" or kind is None and rng.random() < 0.22
+    light = room_light(path, is_white, rng)
     soft = np.tile(cv2.resize(light, (192, 96), interpolation=cv2.INTER_AREA), (1, 3, 1))
     soft = cv2.GaussianBlur(soft, (0, 0), 3)[:, 192:384]
-    turns = 2 * np.pi * np.arange(FRAMES) / FRAMES * rng.choice([-1, 1])
-    sky = np.stack([sampled(soft, ways, turn)[:, 0] for turn in turns], 1)
-    # A hidden direction above the table shows the object in its average light.
-    upper = np.where(ways[:, 1] > 0, 1 / DIRECTIONS, 0)
-    bounced = 0.7 * albedo[~of_table].mean(0) * np.einsum("kfc,k->fc", sky, upper)
-    lit = np.stack([visible(points + np.float32(0.01) * normal, way, surface, disc) for way in ways], 1)
-    still = np.zeros((WIDTH * HEIGHT, FRAMES, 3), np.float32)
-    for some in np.array_split(np.arange(len(hit)), 20):
-        diffuse = np.clip(normal[some] @ ways.T, 0, None) * np.float32(4 / DIRECTIONS)
-        reflected = 2 * (normal[some] * view[some]).sum(1, keepdims=True) * normal[some] - view[some]
-        lobe = np.clip(reflected @ ways.T, 1e-6, None) ** power[some, None]
-        lobe *= (fresnel[some] / lobe.sum(1))[:, None].astype(np.float32)
-        hidden = ~lit[some] & (ways[:, 1] > 0)
-        for c in range(3):
-            transfer = albedo[some, c, None].astype(np.float32) * diffuse + lobe
-            bounce = (transfer * hidden).sum(1)[:, None] * bounced[:, c]
-            radiance = (transfer * lit[some]) @ sky[..., c] + bounce
-            np.add.at(still[..., c], target[some], part_cover[some, None] * radiance)
-    on_object = still[cover[OBJECT].ravel() > 0.99].max(2)
-    level = np.quantile(on_object, 0.97)
-    if kind == "white-room":
-        exposure = rng.uniform(1.1, 1.6)
-    elif kind == "white":
+    turns = 2 * np.pi * np.arange(many) / many * rng.choice([-1, 1])
+    sky = np.stack([sampled(soft, view.ways, turn)[:, 0] for turn in turns], 1).astype(np.float32)
+    still = view.radiance(paint, sky)
+    covered = view.cover[..., OBJECT].ravel() > 0.99
+    level = np.quantile((still[covered] if covered.any() else still).max(2), 0.97)
+    if is_white:
+        exposure = rng.uniform(0.9, 1.7)
+    elif paint.kind == "white" and rng.random() < 0.5:
         exposure = rng.uniform(0.75, 1.5) / level
     else:
-        bright = 0.25 if kind == "black" else 0.8
-        exposure = min(bright * rng.uniform(0.6, 1.4) / level, rng.uniform(0.6, 2) / np.quantile(light[100:412], 0.9))
-    across, down = np.meshgrid(np.arange(WIDTH) + 0.5 - middle[0], np.arange(HEIGHT) + 0.5 - middle[1])
-    rays = unit(np.stack([across / zoom, down / zoom, np.ones_like(across)], -1) @ axes.T)
-    unsharp = cv2.GaussianBlur(light, (0, 0), rng.uniform(0.7, 3))
-    folder = folder / name
-    folder.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(folder / "mask_gt.png"), np.round(cv2.GaussianBlur(cover[OBJECT], (0, 0), 0.6) * 255).astype(np.uint8))
-    grain = rng.normal(0, 1, (2 * HEIGHT, 2 * WIDTH, 3)).astype(np.float32)
-    noise = rng.uniform(0.3, 2) * 1e-3
-    command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "bgr24", "-s", f"{WIDTH}x{HEIGHT}", "-r", "30", "-i", "-"]
-    command += ["-c:v", "mjpeg", "-q:v", "3", "-pix_fmt", "yuvj422p", "-threads", "1", folder / "video.mkv"]
+        bright = 0.25 if paint.kind == "black" else 0.8
+        exposure = min(bright * rng.uniform(0.5, 1.5) / level, rng.uniform(0.6, 2.2) / np.quantile(light[100:412], 0.9))
+    unsharp = cv2.GaussianBlur(light, (0, 0), rng.uniform(0.5, 3.5))
+    camera = Camera(rng)
+    for frame, turn in enumerate(turns):
+        room = sampled(unsharp, view.rays, turn) * view.cover[..., ROOM, None]
+        yield camera.picture(exposure * (room + still[:, frame].reshape(height, width, 3)), rng)
+
+
+class Camera:
+    """Noise, curve, white balance, flicker, shake and blur of a camera."""
+
+    def __init__(self, rng):
+        self.noise, self.curve, self.contrast = rng.uniform(0.1, 2.5) * 1e-3, rng.uniform(0.85, 1.2), rng.uniform(0, 0.35)
+        self.flicker = rng.uniform(0, 0.04) if rng.random() < 0.4 else 0
+        self.shake = rng.uniform(0, 0.7) if rng.random() < 0.3 else 0
+        self.balance, self.blur = rng.uniform(0.9, 1.1, 3), rng.uniform(0.3, 0.9)
+
+    def picture(self, light, rng):
+        height, width = light.shape[:2]
+        light = np.minimum(light * self.balance * (1 + self.flicker * rng.normal()), 4).astype(np.float32)
+        light = cv2.GaussianBlur(light, (0, 0), self.blur)
+        if self.shake:
+            moved = np.float32([[1, 0, rng.normal() * self.shake], [0, 1, rng.normal() * self.shake]])
+            light = cv2.warpAffine(light, moved, (width, height), borderMode=cv2.BORDER_REPLICATE)
+        spread = np.sqrt(self.noise * np.maximum(light, 0) + 1e-6) * 0.35
+        light = np.clip(light + spread * rng.standard_normal(light.shape, np.float32), 0, 1)
+        coded = np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055) ** self.curve
+        coded = (1 - self.contrast) * coded + self.contrast * coded * coded * (3 - 2 * coded)
+        return np.round(coded * 255).astype(np.uint8)
+
+
+def draw_object(meshes, names, is_open, rng):
+    """The name of an object, often with openings, and its mesh."""
+    chance = rng.random()
+    if chance < 0.33:
+        what = str(rng.choice(BUILT))
+        return what, built(what, rng)
+    with_openings = [name for name in names if OPEN.search(name)] or names
+    what = str(rng.choice(with_openings if is_open or chance < 0.55 else names))
+    return what, meshes[what]()
+
+
+def write_video(path, size, frames):
+    command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "bgr24", "-s", f"{size[0]}x{size[1]}", "-r", "30", "-i", "-"]
+    command += ["-c:v", "mjpeg", "-q:v", "3", "-pix_fmt", "yuvj422p", "-threads", "1", path]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as coder:
-        for frame, turn in enumerate(turns):
-            room = sampled(unsharp, rays, turn) * cover[ROOM][..., None]
-            picture = exposure * (room + still[:, frame].reshape(HEIGHT, WIDTH, 3))
-            picture = cv2.GaussianBlur(np.minimum(picture, 4), (0, 0), 0.6)
-            y, x = rng.integers(0, HEIGHT), rng.integers(0, WIDTH)
-            picture += np.sqrt(noise * picture + 1e-6) * 0.5 * grain[y : y + HEIGHT, x : x + WIDTH]
-            picture = np.clip(picture, 0, 1)
-            coded = np.where(picture < 0.0031308, 12.92 * picture, 1.055 * picture ** (1 / 2.4) - 0.055)
-            coder.stdin.write(np.round(coded * 255).astype(np.uint8).tobytes())
+        for picture in frames:
+            coder.stdin.write(picture.tobytes())
     if coder.returncode:
-        raise SystemExit(f"ffmpeg could not write {folder / 'video.mkv'}")
-
-
-def paint(kind, points, parts, rng):
-    """The albedo of an object's points."""
-    many = parts.max() + 1
-    if kind == "black":
-        colours = rng.uniform(0.02, 0.06, (many, 1)) * rng.uniform(0.9, 1.1, (many, 3))
-    elif kind == "white":
-        colours = rng.uniform(0.7, 0.88, (many, 1)) * rng.uniform(0.96, 1, (many, 3))
-    else:
-        colours = rng.uniform(0.05, 0.7, (many, 3)) * rng.uniform(0.4, 1, (many, 1))
-    waves = np.sin(points @ rng.normal(0, 5, 3))[:, None] > rng.uniform(0.2, 1.5)
-    return np.clip(colours[parts] * np.where(waves, rng.uniform(0.5, 1), 1), 0.01, 0.9)
+        raise SystemExit(f"ffmpeg could not write {path}")
 
 
 def make(arguments):
     meshes = sources(arguments.meshes)
-    panoramas = sorted(arguments.panoramas.glob("*.hdr"))
-    is_open = [name for name in meshes if OPEN.search(name)] or list(meshes)
-    for number in range(arguments.seed, arguments.seed + arguments.count):
+    names = [name for name in meshes if is_held_out(name)]
+    rooms = panoramas(arguments.panoramas, held_out=True)
+    number, last = arguments.seed, arguments.seed + arguments.count
+    while number < last:
         rng = np.random.default_rng(number)
         kind = KINDS[number % len(KINDS)]
-        what = rng.choice(BUILT) if rng.random() < 0.4 else str(rng.choice(is_open if kind == "openings" else list(meshes)))
-        mesh = built(what, rng) if what in BUILT else meshes[what]()
-        path = panoramas[rng.integers(len(panoramas))]
-        name = f"{number:04}-{kind}-{what}"
-        render(kind, name, mesh, path, arguments.folder, rng)
-        print(name, path.stem, flush=True)
+        what, mesh = draw_object(meshes, names, kind == "openings", rng)
+        path = rooms[rng.integers(len(rooms))]
+        number += 1
+        try:
+            view = View(mesh, SIZE, rng)
+        except (ValueError, IndexError) as why:
+            print(f"{number - 1:04}-{kind}-{what} is left out: {why}", flush=True)
+            continue
+        folder = arguments.folder / f"{number - 1:04}-{kind}-{what}"
+        folder.mkdir(parents=True, exist_ok=True)
+        mask = cv2.GaussianBlur(view.cover[..., OBJECT], (0, 0), 0.6)
+        cv2.imwrite(str(folder / "mask_gt.png"), np.round(mask * 255).astype(np.uint8))
+        write_video(folder / "video.mkv", SIZE, pictures(view, kind, path, FRAMES, rng))
+        print(folder.name, path.stem, flush=True)
 
 
 def overlap(mask, truth):
@@ -398,7 +539,7 @@ def planted(truth, rng):
     # A whisker of two rows where the object reaches furthest to the left, or else to the right.
     rows, columns = np.nonzero(truth)
     for y, end, reach in ((rows[columns.argmin()], columns.min(), -36), (rows[columns.argmax()], columns.max(), 36)):
-        if 50 < end < WIDTH - 50:
+        if 50 < end < SIZE[0] - 50:
             wrong["whisker"] = truth.copy()
             wrong["whisker"][y : y + 2, min(end, end + reach) : max(end, end + reach)] = True
             break

@@ -1,0 +1,493 @@
+"""The network that tells object, table and room in a turn (src/grabcut/src/turn/network): its data and its training.
+
+    python turn_network.py make MESHES PANORAMAS DATA --views 500 --drawings 800
+    python turn_network.py train DATA --minutes 60 -o src/grabcut/src/turn/network/weights.safetensors
+
+With the packages of requirements-network.txt. A third of the turns are flat drawings: shapes that no mesh has, rooms of
+stripes and spots, tables that fill the lower border, or none. The others are those of turns.py, of other objects and panoramas
+than its `make` takes. DATA/train and DATA/validation get one file a turn: the observations and the shares of room, table
+and object, as 16-bit numbers.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import math
+import pathlib
+import struct
+import time
+
+import cv2
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+from torch.nn.functional import interpolate
+
+import turns
+
+SIZES = [(320, 240), (320, 240), (320, 180)]
+LOW = 192
+FRAMES = [32, 32, 32, 16, 12]
+SHOTS = 3
+# As src/grabcut/src/turn/network/observations.rs describes them.
+PLANES, EDGE, DARK, WHITE = 18, 0.05, 0.02, 250
+MIRRORED_STEPS, WAVES = (14, 16), ((1, 7), (2, 9))
+WIDTHS, NARROW, HEAD = (24, 40, 56, 72, 88), 12, 16
+BATCH = 8
+
+
+def observed(frames):
+    """The planes, but for column and row, of frames of blue, green and red."""
+    many = len(frames)
+    colour = frames.astype(np.float32)[..., ::-1] / 255
+    luma = colour @ np.array([0.299, 0.587, 0.114], np.float32)
+    logs = np.log(np.stack([cv2.blur(frame, (3, 3), borderType=cv2.BORDER_REPLICATE) for frame in luma]) + DARK)
+    spread = lambda deviation, scale, most: np.log1p(scale * deviation) / most
+    apart = [colour[..., channel] - colour[..., 1] for channel in (0, 2)]
+    planes = [*colour.mean(0).transpose(2, 0, 1), luma.min(0), luma.max(0), spread(luma.std(0), 100, 4)]
+    planes.append(spread(np.sqrt(apart[0].var(0) + apart[1].var(0)), 100, 4))
+    angle = 2 * np.pi * np.arange(many) / many
+    rest = logs - logs.mean(0)
+    waves = [2 / many * np.tensordot(of(order * angle).astype(np.float32), rest, 1) for order in (1, 2) for of in (np.cos, np.sin)]
+    variance = (rest**2).mean(0)
+    left = np.maximum(variance - sum(wave * wave for wave in waves) / 2, 0)
+    planes += [np.clip(wave, -2, 2) for wave in waves]
+    planes += [spread(np.sqrt(left), 100, 5), (left + 1e-5) / (variance + 1e-5), (frames.min(-1) >= WHITE).mean(0)]
+    steps = np.zeros((2, *logs.shape), np.float32)
+    steps[0, :, :, :-1], steps[1, :, :-1] = np.diff(logs, axis=2), np.diff(logs, axis=1)
+    planes += [np.minimum((step / EDGE) ** 2, 1).mean(0) for step in steps]
+    planes += [spread(step.std(0), 50, 3) for step in steps]
+    return np.stack(planes)
+
+
+def compressed(picture, quality):
+    return cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_COLOR)
+
+
+def save(path, frames, cover, rng):
+    """Saves what is seen in some of the frames, in a height that the network can halve."""
+    quality, many = int(rng.integers(70, 97)), rng.choice(FRAMES)
+    chosen = np.round(np.arange(many) * len(frames) / many).astype(int) % len(frames)
+    planes = observed(np.stack([compressed(frames[at], quality) for at in chosen]))
+    height, width = planes.shape[1:]
+    both = np.zeros((PLANES + 3, 256 if height > LOW else LOW, width), np.float16)
+    both[:, :height] = np.concatenate([planes, np.clip(cover, 0, 1).transpose(2, 0, 1)])
+    np.save(path, both)
+
+
+def drawn_shape(size, rng):
+    """The coverage of a few ellipses, boxes, rings, polygons and bars, with holes, and their middle and radius."""
+    width, height = size
+    fine = 4
+    canvas = np.zeros((height * fine, width * fine), np.uint8)
+    middle, radius = np.array([width * rng.uniform(0.4, 0.6), height * rng.uniform(0.42, 0.6)]), height * rng.uniform(0.18, 0.4)
+    whole = lambda place: tuple(int(value * fine) for value in place)
+    for number in range(rng.integers(1, 6)):
+        at = middle if number == 0 else middle + rng.uniform(-1, 1, 2) * radius * [1, 0.9]
+        r = radius * (rng.uniform(0.5, 1) if number == 0 else rng.uniform(0.15, 0.6))
+        kind = rng.choice(["ellipse", "box", "ring", "polygon", "bar"])
+        if kind == "ellipse":
+            cv2.ellipse(canvas, whole(at), whole((r * rng.uniform(0.5, 1), r)), rng.uniform(0, 180), 0, 360, 255, -1)
+        elif kind == "box":
+            sides = (r * fine * rng.uniform(0.3, 1.6), r * fine * rng.uniform(0.8, 1.6))
+            corners = cv2.boxPoints((whole(at), sides, float(rng.choice([0, rng.uniform(0, 90)]))))
+            cv2.fillPoly(canvas, [corners.astype(np.int32)], 255)
+        elif kind == "ring" and number > 0:
+            thick = int(max(2, r * rng.uniform(0.12, 0.4)) * fine)
+            cv2.ellipse(canvas, whole(at), whole((r, r * rng.uniform(0.6, 1.1))), 0, 0, 360, 255, thick)
+        elif kind == "polygon":
+            angle = np.sort(rng.uniform(0, 6.28, rng.integers(3, 7)))
+            corners = at + r * rng.uniform(0.5, 1.1, (len(angle), 1)) * np.stack([np.cos(angle), np.sin(angle)], 1)
+            cv2.fillPoly(canvas, [(corners * fine).astype(np.int32)], 255)
+        else:
+            angle = rng.uniform(0, 6.28)
+            end = at + 1.3 * r * np.array([np.cos(angle), np.sin(angle)])
+            cv2.line(canvas, whole(middle), whole(end), 255, int(max(1.5, rng.uniform(0.03, 0.25) * r) * fine))
+    for _ in range(rng.choice([0, 0, 1, 1, 2])):
+        at, r = middle + rng.uniform(-0.6, 0.6, 2) * radius, radius * rng.uniform(0.1, 0.35)
+        cv2.ellipse(canvas, whole(at), whole((r, r * rng.uniform(0.5, 1.2))), 0, 0, 360, 0, -1)
+    cover = cv2.resize(canvas.astype(np.float32) / 255, size, interpolation=cv2.INTER_AREA)
+    _, labels, figures, _ = cv2.connectedComponentsWithStats((cover > 0.5).astype(np.uint8), connectivity=8)
+    areas = figures[1:, cv2.CC_STAT_AREA]
+    if len(areas) == 0:
+        raise ValueError("the drawing is empty")
+    kept = np.isin(labels, 1 + np.flatnonzero(areas >= 0.3 * areas.max())).astype(np.uint8)
+    return cover * cv2.dilate(kept, np.ones((3, 3), np.uint8)), middle, radius
+
+
+def spots(size, rng, low, high):
+    """Noise of three scales, in three channels."""
+    total = np.zeros((size[1], size[0], 3), np.float32)
+    for scale in np.exp(rng.uniform(np.log(low), np.log(high), 3)):
+        cells = rng.normal(0, 1, (int(size[1] / scale) + 2, int(size[0] / scale) + 2, 3)).astype(np.float32)
+        if rng.random() < 0.7:
+            cells = 0.4 * cells + 0.8 * cells[..., :1]
+        how = rng.choice([cv2.INTER_CUBIC, cv2.INTER_LINEAR, cv2.INTER_NEAREST])
+        total += cv2.resize(cells, size, interpolation=how) * rng.uniform(0.2, 0.8)
+    return total
+
+
+def drawn_room(size, rooms, rng):
+    """A strip of light that closes in itself and passes behind the object in a turn."""
+    width, height = size
+    around = int(width / rng.uniform(0.1, 0.3))
+    kind = rng.choice(["panorama", "spots", "white", "stripes"], p=[0.5, 0.25, 0.15, 0.1])
+    if kind == "panorama":
+        light = turns.read_panorama(rooms[rng.integers(len(rooms))])
+        row, half = int(light.shape[0] * rng.uniform(0.3, 0.55)), max(4, int(light.shape[1] * height / around / 2))
+        strip = cv2.resize(light[max(0, row - half) : row + half], (around, height), interpolation=cv2.INTER_LINEAR)
+        strip = cv2.GaussianBlur(strip, (0, 0), rng.uniform(0.5, 8))
+        strip *= rng.uniform(0.1, 0.8) / max(strip.mean(), 1e-3)
+    elif kind == "spots":
+        strip = np.exp(spots((around, height), rng, 6, 150) * rng.uniform(0.5, 1.5) + rng.uniform(-2.5, -0.3))
+    elif kind == "stripes":
+        colours = rng.uniform(0.02, 0.9, (1, max(2, around // rng.integers(8, 60)), 3)).astype(np.float32)
+        strip = np.repeat(cv2.resize(colours, (around, 1), interpolation=cv2.INTER_NEAREST), height, 0)
+    else:
+        strip = rng.uniform(0.9, 1.5) * (1 + 0.1 * rng.uniform(0, 1) * spots((around, height), rng, 40, 200))
+    return np.concatenate([strip, strip[:, : width + 2]], 1).astype(np.float32), around
+
+
+def drawn_turn(size, rooms, many, rng):
+    """The frames of a turn of a flat drawing, and the shares of room, table and object."""
+    width, height = size
+    cover, middle, radius = drawn_shape(size, rng)
+    down, across = np.mgrid[0:height, 0:width].astype(np.float32)
+    inside = (cover > 0.5).astype(np.uint8)
+    relief = np.sqrt(cv2.distanceTransform(inside, cv2.DIST_L2, 5)) * rng.uniform(0.5, 3)
+    relief = cv2.GaussianBlur(relief, (0, 0), rng.uniform(1, 4))
+    bumps = cv2.GaussianBlur(rng.normal(0, 1, (height, width)).astype(np.float32), (0, 0), rng.uniform(3, 15))
+    slope_down, slope_across = np.gradient(relief + bumps * rng.uniform(0, 30))
+    is_flat = rng.random() < 0.12
+    if is_flat:
+        slope_across, slope_down = np.zeros_like(relief), np.zeros_like(relief)
+    normal = turns.unit(np.stack([-slope_across, slope_down, np.full_like(relief, rng.uniform(0.5, 1.5))], -1))
+    kinds = [rng.uniform(0.05, 0.8, 3), np.full(3, rng.uniform(0.012, 0.05)), np.full(3, rng.uniform(0.6, 0.9)), np.full(3, rng.uniform(0.05, 0.6))]
+    base = kinds[rng.choice(4, p=[0.45, 0.2, 0.15, 0.2])]
+    paint = np.broadcast_to(base, (height, width, 3))
+    if rng.random() < 0.6:
+        edge = (spots(size, rng, 4, 60)[..., :1] - rng.uniform(-0.5, 0.8)) / rng.choice([0.02, 0.3])
+        share = 1 / (1 + np.exp(-np.clip(edge, -30, 30)))
+        paint = paint * (1 - share) + share * (base * rng.uniform(0.3, 1) if rng.random() < 0.5 else rng.uniform(0.02, 0.8, 3))
+    round_spot = lambda x, y, a, b: ((across - x) / a) ** 2 + ((down - y) / b) ** 2
+    for _ in range(rng.choice([0, 0, 1, 2])):
+        at, sides = middle + rng.uniform(-0.4, 0.4, 2) * radius, radius * rng.uniform(0.1, 0.45, 2)
+        paint = np.where((round_spot(*at, *sides) < 1)[..., None], rng.uniform(0.01, 0.06), paint)
+    unshaded = np.ones_like(relief)
+    for _ in range(rng.choice([0, 0, 1, 2])):
+        at, sides = middle + rng.uniform(-0.5, 0.5, 2) * radius, radius * rng.uniform(0.1, 0.4, 2)
+        unshaded *= 1 - rng.uniform(0.3, 0.95) * np.exp(-round_spot(*at, *sides) ** rng.uniform(1, 4))
+    chance, foot = rng.random(), middle[1] + 0.9 * radius
+    if chance < 0.2:
+        table = np.zeros_like(relief)
+    elif chance < 0.55:
+        line = middle[1] + radius * rng.uniform(0.2, 1.05) + rng.uniform(-0.05, 0.05) * (across - width / 2)
+        table = np.clip(down - line + 0.5, 0, 1)
+    else:
+        a, b, top = radius * rng.uniform(1.1, 2.8), radius * rng.uniform(0.25, 1), middle[1] + radius * rng.uniform(0.6, 1)
+        disc = lambda y: np.clip((1 - np.sqrt(round_spot(middle[0], y, a, b))) * min(a, b) + 0.5, 0, 1)
+        table = np.maximum(disc(top), disc(top + radius * rng.uniform(0, 0.2)))
+    table_paint = rng.uniform(0.01, 0.07) * rng.uniform(0.9, 1.1, 3)
+    lamps = [(rng.uniform(0, 6.28), rng.uniform(0, 0.9), rng.uniform(0.3, 1.5)) for _ in range(rng.integers(1, 4))]
+    even, contact, exposure = rng.uniform(0.1, 0.5), rng.uniform(0.2, 0.9), rng.uniform(0.5, 1.5)
+    gloss, power = (rng.uniform(0, 0.3) if rng.random() < 0.4 else 0), rng.uniform(8, 80)
+    strip, around = drawn_room(size, rooms, rng)
+    camera = turns.Camera(rng)
+    of_object, of_table = cover[..., None], (table * (1 - cover))[..., None]
+    frames = []
+    for turn in 2 * np.pi * np.arange(many) / many * rng.choice([-1, 1]):
+        light, on_table, shine = even * (1 + 0.3 * normal[..., 1]), 1.3 * even, 0
+        shadow = 1 - contact * np.exp(-round_spot(middle[0], foot, 1.1 * radius, 0.35 * radius))
+        for angle, high, strength in lamps:
+            to = np.array([np.sin(turn + angle) * np.cos(high), np.sin(high), np.cos(turn + angle) * np.cos(high)])
+            light = light + strength * np.maximum(normal @ to, 0)
+            on_table += strength * max(to[1], 0)
+            cast = round_spot(middle[0] - 1.2 * radius * to[0], foot - 0.3 * radius * to[2], 0.9 * radius, 0.3 * radius)
+            shadow = shadow * (1 - 0.5 * strength / (strength + 1) * np.exp(-cast))
+            shine = shine + gloss * strength * np.maximum(normal @ turns.unit(to + [0, 0, 1]), 0) ** power
+        place = turn / (2 * np.pi) * around % around
+        room = strip[:, int(place) : int(place) + width] * (1 - place % 1) + strip[:, int(place) + 1 : int(place) + 1 + width] * (place % 1)
+        if is_flat:
+            flicker = rng.uniform(0.6, 1.2)
+            light, on_table = np.full_like(relief, flicker), flicker
+        shown = (paint * light[..., None] + np.asarray(shine)[..., None]) * unshaded[..., None]
+        picture = room * (1 - of_object - of_table) + table_paint * on_table * shadow[..., None] * of_table + shown * of_object
+        frames.append(camera.picture(exposure * picture, rng))
+    return frames, np.concatenate([1 - of_object - of_table, of_table, of_object], -1)
+
+
+def make(arguments):
+    meshes = turns.sources(arguments.meshes)
+    for part, held_out, views in (("validation", True, arguments.views // 8), ("train", False, arguments.views)):
+        folder = arguments.data / part
+        folder.mkdir(parents=True, exist_ok=True)
+        names = [name for name in meshes if turns.is_held_out(name) == held_out]
+        rooms = turns.panoramas(arguments.panoramas, held_out)
+        for number in range(arguments.seed, arguments.seed + views):
+            rng = np.random.default_rng([number, held_out])
+            what, mesh = turns.draw_object(meshes, names, False, rng)
+            try:
+                view = turns.View(mesh, SIZES[rng.integers(len(SIZES))], rng)
+            except (ValueError, IndexError) as why:
+                print(f"{what} is left out: {why}", flush=True)
+                continue
+            for shot in range(SHOTS):
+                frames = list(turns.pictures(view, None, rooms[rng.integers(len(rooms))], max(FRAMES), rng))
+                save(folder / f"{number:05}-{shot}.npy", frames, view.cover, rng)
+        for number in range(arguments.seed, arguments.seed + (0 if held_out else arguments.drawings)):
+            rng = np.random.default_rng([number, 77])
+            try:
+                frames, cover = drawn_turn(SIZES[rng.integers(len(SIZES))], rooms, max(FRAMES), rng)
+            except ValueError:
+                continue
+            save(folder / f"{number:05}-drawing.npy", frames, cover, rng)
+
+
+def layer(inputs, outputs):
+    return nn.Sequential(nn.Conv2d(inputs, outputs, 3, 1, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True))
+
+
+class Network(nn.Module):
+    """As src/grabcut/src/turn/network/mod.rs: logits of object, table and room."""
+
+    def __init__(self):
+        super().__init__()
+        sizes = [PLANES + 2, *WIDTHS]
+        pairs = list(zip(sizes, sizes[1:]))
+        self.encoder = nn.ModuleList(nn.Sequential(layer(a, b), layer(b, b)) for a, b in pairs)
+        decoder = [nn.Sequential(layer(b + a, a), layer(a, a)) for a, b in pairs[:0:-1]]
+        decoder[-1] = decoder[-1][:1]
+        self.decoder = nn.ModuleList(decoder)
+        self.narrow = layer(WIDTHS[0], NARROW)
+        self.head = nn.Sequential(layer(NARROW + sizes[0], HEAD), nn.Conv2d(HEAD, 3, 3, 1, 1))
+
+    def forward(self, seen):
+        many, _, height, width = seen.shape
+        across = torch.linspace(-1, 1, width).expand(many, 1, height, width)
+        down = torch.linspace(-1, 1, height)[:, None].expand(many, 1, height, width)
+        sizes = [torch.cat([seen, across, down], 1)]
+        for layers in self.encoder:
+            sizes.append(layers(functional.avg_pool2d(sizes[-1], 2)))
+        planes = sizes.pop()
+        for layers in self.decoder:
+            planes = layers(torch.cat([interpolate(planes, scale_factor=2.0), sizes.pop()], 1))
+        planes = interpolate(self.narrow(planes), scale_factor=2.0)
+        return self.head(torch.cat([planes, sizes[0]], 1))
+
+
+def varied(turn, rng):
+    """A turn mirrored, begun elsewhere, run backwards, with other colours, brightness and scales of the observations."""
+    turn = turn.copy()
+    if rng.random() < 0.5:
+        turn = turn[:, :, ::-1].copy()
+        for plane in MIRRORED_STEPS:
+            turn[plane] = np.roll(turn[plane], -1, 1)
+    begin = rng.uniform(0, 2 * np.pi)
+    for order, plane in WAVES:
+        cosine, sine = math.cos(order * begin), math.sin(order * begin)
+        of_cosine, of_sine = turn[plane].astype(np.float32), turn[plane + 1].astype(np.float32)
+        turn[plane], turn[plane + 1] = cosine * of_cosine - sine * of_sine, sine * of_cosine + cosine * of_sine
+    if rng.random() < 0.5:
+        turn[[plane + 1 for _, plane in WAVES]] *= -1
+    if rng.random() < 0.3:
+        turn[:3] = turn[rng.permutation(3)]
+    turn[:5] *= np.float16(rng.uniform(0.85, 1.15))
+    if rng.random() < 0.3:
+        turn[:PLANES] *= 1 + rng.normal(0, 0.03, (PLANES, 1, 1)).astype(np.float16)
+    return turn
+
+
+def apart(turns_):
+    """Observations, and the shares of object, table and room."""
+    both = torch.from_numpy(turns_).float()
+    return both[:, :PLANES].contiguous(memory_format=torch.channels_last), both[:, PLANES:].flip(1)
+
+
+def loss(logits, shares):
+    """Cross-entropy, four times as much along the object's outline, and half of what Dice's coefficient lacks."""
+    counts = shares.sum(1, keepdim=True)
+    log = functional.log_softmax(logits.float(), 1)
+    of_object = shares[:, :1]
+    near = functional.max_pool2d(of_object, 7, 1, 3) + functional.max_pool2d(-of_object, 7, 1, 3) > 0.5
+    weight = counts * (1 + 3 * near.float())
+    entropy = (-(shares * log).sum(1, keepdim=True) * weight).sum() / weight.sum()
+    found = log.exp()[:, :1] * counts
+    total = lambda of: of.sum((1, 2, 3))
+    dice = (2 * total(found * of_object) + 1) / (total(found) + total(of_object) + 1)
+    return entropy + 0.5 * (1 - dice).mean()
+
+
+@torch.no_grad()
+def overlaps(network, paths):
+    network.eval()
+    found = []
+    for path in paths:
+        seen, shares = apart(np.load(path)[None])
+        with torch.autocast("cpu", torch.bfloat16):
+            logits = network(seen).float()
+        is_object = (logits[:, 0] > logits[:, 1:].logsumexp(1)) & (shares.sum(1) > 0.5)
+        truth = shares[:, 0] > 0.5
+        found.append(((is_object & truth).sum() / (is_object | truth).sum().clamp(min=1)).item())
+    return np.array(found)
+
+
+def batches(folder, rng):
+    """Batches of turns of one height, for ever."""
+    paths = {LOW: [], 256: []}
+    for path in sorted(folder.glob("*.npy")):
+        paths[np.load(path, mmap_mode="r").shape[1]].append(path)
+    if min(map(len, paths.values())) < BATCH:
+        raise SystemExit(f"{folder} has too few turns: make at least 40 views")
+    share = len(paths[LOW]) / sum(map(len, paths.values()))
+    orders = {height: [] for height in paths}
+    while True:
+        height = LOW if rng.random() < share else 256
+        if len(orders[height]) < BATCH:
+            orders[height] = [paths[height][at] for at in rng.permutation(len(paths[height]))]
+        seen, shares = apart(np.stack([varied(np.load(orders[height].pop()), rng) for _ in range(BATCH)]))
+        # Some smaller, as small frames are.
+        by = rng.choice([1, 2, 4], p=[0.82, 0.13, 0.05])
+        if by > 1:
+            low = LOW // by // 32 * 32 * by
+            wide = seen.shape[3] // by // 32 * 32 * by
+            seen, shares = (functional.avg_pool2d(planes[:, :, :low, :wide], int(by)) for planes in (seen, shares))
+        yield seen, shares
+
+
+def prepared(source):
+    """What a generator yields, each made while the one before is used."""
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        upcoming = pool.submit(next, source)
+        while True:
+            ready, upcoming = upcoming.result(), pool.submit(next, source)
+            yield ready
+
+
+def train(arguments):
+    torch.manual_seed(0)
+    rng = np.random.default_rng(0)
+    network, mean = (Network().to(memory_format=torch.channels_last) for _ in range(2))
+    if arguments.begin:
+        network.load_state_dict(torch.load(arguments.begin))
+    mean.load_state_dict(network.state_dict())
+    optimiser = torch.optim.AdamW(network.parameters(), lr=arguments.learning_rate, weight_decay=1e-2)
+    validation = sorted((arguments.data / "validation").glob("*.npy"))
+    begun, recent = time.monotonic(), []
+    for step, (seen, shares) in enumerate(prepared(batches(arguments.data / "train", rng))):
+        done = (time.monotonic() - begun) / 60 / arguments.minutes
+        if done >= 1:
+            break
+        for group in optimiser.param_groups:
+            group["lr"] = arguments.learning_rate * min(1, step / 100 + 0.01) * (0.5 + 0.5 * math.cos(math.pi * done) + 0.002)
+        network.train()
+        with torch.autocast("cpu", torch.bfloat16):
+            logits = network(seen)
+        value = loss(logits, shares)
+        optimiser.zero_grad()
+        value.backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        recent = [*recent[-99:], value.item()]
+        decay = min(0.995, (step + 1) / (step + 10))
+        with torch.no_grad():
+            for averaged, own in zip(mean.parameters(), network.parameters()):
+                averaged.lerp_(own, 1 - decay)
+            for averaged, own in zip(mean.buffers(), network.buffers()):
+                averaged.copy_(own)
+        if step % 500 == 499:
+            print(f"step {step + 1}, loss {np.mean(recent):.4f}, overlap {turns.mean(overlaps(mean, validation))}", flush=True)
+            torch.save(mean.state_dict(), arguments.output.with_suffix(".pt"))
+    print(f"{step} steps, overlap {turns.mean(overlaps(mean, validation))}")
+    torch.save(mean.state_dict(), arguments.output.with_suffix(".pt"))
+    write(mean, arguments.output)
+
+
+def write(network, path):
+    """The weights as safetensors of 16-bit numbers, with the normalisation in the convolutions."""
+    tensors = {}
+    groups = {"encoder": network.encoder, "decoder": network.decoder}
+    named = [(f"{part}.{size}.{at}", one) for part, sizes in groups.items() for size, layers in enumerate(sizes) for at, one in enumerate(layers)]
+    for name, (convolution, normal, _) in [*named, ("narrow", network.narrow), ("head.0", network.head[0])]:
+        scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
+        tensors[f"{name}.weight"] = convolution.weight * scale[:, None, None, None]
+        tensors[f"{name}.bias"] = normal.bias - normal.running_mean * scale
+    tensors["head.1.weight"], tensors["head.1.bias"] = network.head[1].weight, network.head[1].bias
+    header, data = {}, b""
+    for name, tensor in sorted(tensors.items()):
+        own = tensor.detach().numpy().astype(np.float16).tobytes()
+        header[name] = {"dtype": "F16", "shape": list(tensor.shape), "data_offsets": [len(data), len(data) + len(own)]}
+        data += own
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    path.write_bytes(struct.pack("<Q", len(text)) + text + data)
+
+
+def read(path):
+    """The network of written weights: its normalisation does nothing."""
+    data = path.read_bytes()
+    begin = 8 + struct.unpack("<Q", data[:8])[0]
+    tensors = {}
+    for name, entry in json.loads(data[8:begin]).items():
+        first, last = (begin + offset for offset in entry["data_offsets"])
+        numbers = np.frombuffer(data[first:last], np.float16).reshape(entry["shape"])
+        tensors[name] = torch.from_numpy(numbers.astype(np.float32))
+    network = Network()
+    state = network.state_dict()
+    for name in state:
+        layer_name, part, what = name.rsplit(".", 2) if not name.startswith("head.1.") else ("", "", "")
+        if name.startswith("head.1."):
+            state[name] = tensors[name]
+        elif part == "0":
+            state[name] = tensors[f"{layer_name}.weight"]
+        elif what == "bias":
+            state[name] = tensors[f"{layer_name}.bias"]
+        elif what in ("weight", "running_var"):
+            state[name] = torch.ones_like(state[name])
+        else:
+            state[name] = torch.zeros_like(state[name])
+    network.load_state_dict(state)
+    return network
+
+
+def parity(arguments):
+    """Logits of a pattern that moves, for the test of src/grabcut/src/turn/network/mod.rs."""
+    network = read(arguments.weights)
+    down, across = np.mgrid[0:72, 0:96]
+    level = lambda turn, channel: (3 * across + down * (5 + channel) + turn * (across // 8 + 1) * (11 + channel) + across * down // 7) % 256
+    frames = np.stack([np.stack([level(turn, channel) for channel in (2, 1, 0)], -1) for turn in range(8)]).astype(np.uint8)
+    planes = np.zeros((1, PLANES, 96, 96), np.float32)
+    planes[0, :, :72] = observed(frames)
+    with torch.no_grad():
+        logits = network.eval()(torch.from_numpy(planes))[0].numpy()
+    for what, found in (("plane", planes[0]), ("logit", logits)):
+        for number, plane in enumerate(found):
+            print(what, number, *(f"{plane[y, x]:.5f}" for x, y in ((7, 5), (50, 33), (95, 71))))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    verbs = parser.add_subparsers(required=True)
+    making = verbs.add_parser("make")
+    for name in ("meshes", "panoramas", "data"):
+        making.add_argument(name, type=pathlib.Path)
+    making.add_argument("--views", type=int, default=500)
+    making.add_argument("--drawings", type=int, default=800)
+    making.add_argument("--seed", type=int, default=0)
+    making.set_defaults(run=make)
+    training = verbs.add_parser("train")
+    training.add_argument("data", type=pathlib.Path)
+    training.add_argument("--minutes", type=float, default=60)
+    training.add_argument("--learning-rate", type=float, default=3e-3)
+    training.add_argument("--from", dest="begin", type=pathlib.Path, help="a checkpoint to begin with")
+    training.add_argument("-o", "--output", type=pathlib.Path, required=True)
+    training.set_defaults(run=train)
+    comparing = verbs.add_parser("parity")
+    comparing.add_argument("weights", type=pathlib.Path)
+    comparing.set_defaults(run=parity)
+    arguments = parser.parse_args()
+    arguments.run(arguments)
+
+
+if __name__ == "__main__":
+    main()
