@@ -74,7 +74,7 @@ impl MaskComparison<'_> {
         let small = halved(self.mask, self.halvings);
         let mut turn = TurnFrames::new(small.width(), small.height());
         let frame = self.collect(numbers, &mut turn)?;
-        let statistics = TurnStatistics::new(&turn, effort);
+        let statistics = TurnStatistics::new(&turn);
         let check = match MaskCheck::new(&small, &statistics) {
             Ok(check) => check,
             Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(None),

@@ -165,11 +165,6 @@ impl Bitmap {
         self.inverted().dilated(radius).inverted().dilated(radius)
     }
 
-    /// Closing: with the gaps that are at most twice `radius` wide.
-    pub(super) fn closed(&self, radius: usize) -> Self {
-        self.dilated(radius).inverted().dilated(radius).inverted()
-    }
-
     /// Of the components those that `keep` wants by their figures; its second argument gives their pixels.
     pub(super) fn parts_where(
         &self,
@@ -181,12 +176,6 @@ impl Bitmap {
             .map(|(index, part)| keep(part, &|| self.map(|at, _| components.at(at) == Some(index))))
             .collect();
         self.map(|at, _| components.at(at).is_some_and(|index| kept[index]))
-    }
-
-    /// What is not set and does not reach the border.
-    pub(super) fn holes(&self) -> Self {
-        let hole = |part: &Component, _: &dyn Fn() -> Self| self.is_inside(part);
-        self.inverted().parts_where(Connectivity::Four, hole)
     }
 
     /// Whether a component does not reach the border.
@@ -385,12 +374,5 @@ mod tests {
         assert_eq!(bitmap.components(Connectivity::Eight).largest(), None);
         assert_eq!(bitmap.bounds(), Rect::new(0, 0, 0, 0));
         assert_eq!(bitmap.inverted().bounds(), Rect::new(0, 0, 3, 2));
-    }
-
-    #[test]
-    fn only_what_is_enclosed_is_a_hole() {
-        let rows = ["#####", "#.#.#", "###.#"];
-        let wanted = [".....", ".#...", "....."];
-        assert_eq!(Bitmap::drawn(&rows).holes(), Bitmap::drawn(&wanted));
     }
 }

@@ -42,13 +42,13 @@
 //! and what is connected with them; if no background is marked, unmarked pixels start as probable background. Colour
 //! models of both sides and minimum cuts take turns, and at each larger size a band along the edge is decided again.
 //!
-//! With a turn, a pixel's colour is its average over the frames, how much it changes counts too, and
-//! neighbours that change together belong together. What equals the ends of its row is background: the
-//! room passes through the whole row. So are the table and its rim.
+//! With a turn, a small network says which pixels show object, table or room. A pixel's colour is its average over the
+//! frames, how much it changes counts too, and neighbours that change together belong together.
 //!
 //! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
 //! Small holes are filled, except those in which seeds mark background.
 
+mod beyond;
 mod bitmap;
 mod check;
 mod cleanup;

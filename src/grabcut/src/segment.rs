@@ -4,6 +4,7 @@ use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 use serde::{Deserialize, Serialize};
 
+use super::beyond;
 use super::bitmap::{Bitmap, Component, Connectivity};
 use super::cut::energy::CutEnergy;
 use super::cut::grab_cut::Label;
@@ -13,7 +14,8 @@ use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
 use super::turn::statistics::TurnStatistics;
 use super::warning::{
-    IMPLAUSIBLE, NOTHING_MOVES, OPENING, filled, hole_filled, turn_dropped, warnings,
+    IMPLAUSIBLE, NOTHING_MOVES, OPENING, UNCLEAR_TURN, cut_off, filled, hole_filled, turn_dropped,
+    warnings,
 };
 use super::{Effort, Hints, Mark, MaskError, SegmentSettings, cleanup};
 
@@ -23,6 +25,8 @@ const FILLED_OF_FRAME: f64 = 0.01;
 const FILLED_OF_TURN: f64 = 0.001;
 /// The turn's outline has at least this share of the strength of the hints' one.
 const MIN_OF_HINTS: f32 = 0.85;
+/// A turn's mask gets a warning if its expected overlap with the object is smaller.
+const UNSURE: f32 = 0.88;
 /// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
 const REACHES: f64 = 0.04;
 /// By how much a cut has to be better than that of GrabCut's own start where that reaches all sides of the rectangle, in
@@ -176,10 +180,22 @@ fn cut_unclosed(
         return dropped(other, &why);
     }
     let mut mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN);
+    if turn.expected_overlap(&Bitmap::from_mask(&mask.image), &sure(hints, size)?) < UNSURE {
+        mask.warnings.push(UNCLEAR_TURN.to_owned());
+    }
     if !turn.moves() {
         mask.warnings.push(NOTHING_MOVES.to_owned());
     }
     Ok(mask)
+}
+
+/// The pixels of which hints leave no doubt.
+fn sure(hints: &Hints, size: (u32, u32)) -> Result<Bitmap, MaskError> {
+    let labels = Trimap::new(hints, size)?.labels;
+    Ok(Bitmap::new(
+        size,
+        labels.iter().map(|label| label.is_sure()),
+    ))
 }
 
 /// The part of the rectangle that is inside the frame.
@@ -245,18 +261,26 @@ fn by_hints(
         rect,
     } = initial(hints, size)?;
     let pyramid = Pyramid::new(frame, labels)?;
-    let (cut, is_plausible) = match rect {
+    let (mut cut, is_plausible) = match rect {
         Some(rect) => best_cut(&pyramid, rect, first, settings)?,
         None => (
             pyramid.cut(pyramid.coarsest().labels.clone(), first, None)?,
             true,
         ),
     };
+    let mut goes_on = None;
+    if let Some(rect) = rect.filter(|_| hints.seeds.is_none())
+        && let Some((longer, sides)) =
+            beyond::continued(&pyramid, &cut, rect, surroundings(rect, NEAR))
+    {
+        (cut, goes_on) = (longer, Some(sides));
+    }
     let raw = pyramid.refined(cut, effort);
     let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME);
     if !is_plausible {
         mask.warnings.push(IMPLAUSIBLE.to_owned());
     }
+    mask.warnings.extend(goes_on.map(|sides| cut_off(&sides)));
     Ok(mask)
 }
 

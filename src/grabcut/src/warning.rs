@@ -20,6 +20,9 @@ const NEARLY_RECT: f64 = 0.97;
 /// Hardly anything changes over the video.
 pub(super) const NOTHING_MOVES: &str = "hardly anything changes over the video: without a moving background the mask rests on the average colours alone; check it, or give a rectangle";
 
+/// Little overlap with the object is to be expected of a mask by the turn.
+pub(super) const UNCLEAR_TURN: &str = "the turn does not show clearly what is object: check the mask, and mark object and background in --edit or in seeds";
+
 /// The size or the pieces of a cut were not those of an object.
 pub(super) const IMPLAUSIBLE: &str = "object and background look alike, so that several cuts were tried: check the mask, and mark object and background in seeds";
 
@@ -32,6 +35,14 @@ pub(super) fn turn_dropped(why: &str) -> String {
 pub(super) fn hole_filled(&Component { area, bounds }: &Component) -> String {
     format!(
         "a hole of {area} pixels at {bounds} was filled: if it is an opening, mark it black in seeds"
+    )
+}
+
+/// The object seems to go on beyond some sides of its rectangle.
+pub(super) fn cut_off(sides: &[&str]) -> String {
+    format!(
+        "the object seems to go on beyond the rectangle (on the {} side): if so, draw a larger one",
+        sides.join(", ")
     )
 }
 

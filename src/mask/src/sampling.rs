@@ -4,7 +4,7 @@ use std::fs;
 
 use image::RgbImage;
 use relit_data::still::Colour;
-use relit_grabcut::{Effort, TURN_FRAMES, TurnFrames, TurnStatistics};
+use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
 use relit_video::Video;
 
 use super::request::TurnRequest;
@@ -48,7 +48,7 @@ pub(super) fn sampled(
         frames.push(number);
         turn.push(&picture);
     }
-    let statistics = TurnStatistics::new(&turn, Effort::Fine);
+    let statistics = TurnStatistics::new(&turn);
     Ok(SampledTurn { frames, statistics })
 }
 

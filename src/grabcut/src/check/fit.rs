@@ -1,14 +1,13 @@
 //! Whether a mask fits a turn: where its shape differs from what the turn shows.
 //!
-//! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of
-//! brightness and the lasting edges there show decides.
+//! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the network says
+//! of the pixels there decides.
 
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 use serde::Serialize;
 
 use crate::bitmap::{Bitmap, Component, Connectivity};
-use crate::turn::statistics::TurnField;
 use crate::turn::thin_parts::thin_parts;
 use crate::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_with};
 
@@ -19,6 +18,10 @@ const SMALL: f64 = 0.001;
 /// A thin part of the mask that does not belong to the object is a whisker from this length on, as a share of the
 /// frame's width.
 const WHISKER: f64 = 0.04;
+/// What the turn says of a part is clear from these odds on, as a logarithm.
+const CLEAR: f32 = 4.0;
+/// And gives reason to look at more frames from these on.
+const SUSPECT: f32 = 1.0;
 /// A part of the mask with more than this share of table is not an object that the frame's border cuts off.
 const ON_TABLE: f64 = 0.5;
 
@@ -113,24 +116,20 @@ impl<'a> MaskCheck<'a> {
         let leaks = self.without_cut_off(&self.mask.minus(&own).opened(wide));
         let missing = own.minus(&self.mask).opened(wide);
         let differing = leaks.count() + missing.count();
-        // The curves compare a part with the rest of the mask, which is no witness where it is the smaller one.
+        // A mask that is mostly background is not one that the turn confirms.
         let witnessed = 2 * leaks.count() < self.mask.count();
-        let clear = |turn: &TurnField, part: &Bitmap, mask: &Bitmap| {
-            if turn.ends_without_edge(part, mask) {
-                return Some(true);
-            }
-            // A draft only has to suspect.
-            let is_clear =
-                || effort == Effort::Draft || turn.is_clearly_background(part, mask, moves);
-            turn.is_background(part, mask)
-                .filter(|found| !found || is_clear())
+        // A draft only has to suspect.
+        let clear = if effort == Effort::Draft {
+            SUSPECT
+        } else {
+            CLEAR
         };
-        let undecided = self.shown(&leaks, |turn, part, mask| clear(turn, part, mask).is_none());
-        let leaks = self.shown(&leaks, |turn, part, mask| {
-            clear(turn, part, mask) == Some(true)
-        });
+        let is_background = |odds: f32| odds < -clear;
+        let is_object = |odds: f32| odds > clear;
+        let undecided = self.shown(&leaks, |odds| !is_background(odds) && !is_object(odds));
+        let leaks = self.shown(&leaks, is_background);
         let whiskers = self.whiskers(&own);
-        let missing = self.shown(&missing, |turn, part, mask| turn.belongs(part, mask, moves));
+        let missing = self.shown(&missing, is_object);
         let undisputed = leaks.count() + missing.count() + undecided.count() == 0;
         let least = self.mask.count() as f64 * SMALL;
         // Where hardly anything moves, no outline follows it.
@@ -149,14 +148,13 @@ impl<'a> MaskCheck<'a> {
         Ok((moves || !shape.faults().is_empty()).then_some(shape))
     }
 
-    /// Of parts in which the mask may be wrong, those that the turn shows to be background, or object. The
-    /// turn's own mask does not count.
-    fn shown(&self, parts: &Bitmap, says: impl Fn(&TurnField, &Bitmap, &Bitmap) -> bool) -> Bitmap {
-        let object = self.turn.downscaled(&self.mask);
+    /// Parts in which the mask may be wrong and the turn says so: `says` gets the logarithm of the odds that a part is
+    /// object. The turn's own mask does not count.
+    fn shown(&self, parts: &Bitmap, says: impl Fn(f32) -> bool) -> Bitmap {
         let least = self.mask.count() as f64 * SMALL;
         parts.parts_where(Connectivity::Eight, |component, part| {
-            let part = || self.turn.downscaled(&part());
-            component.area as f64 >= least && says(&self.turn.fine, &part(), &object)
+            let odds = || self.turn.fine.odds(&self.turn.downscaled(&part()));
+            component.area as f64 >= least && says(odds())
         })
     }
 
@@ -197,7 +195,7 @@ impl<'a> MaskCheck<'a> {
             let within = field.boundary(&part, &mask.minus(&part));
             let moves_with_rest = within.zip(field.boundary(&part, &mask.inverted()));
             let is_object = moves_with_rest.is_some_and(|(within, outside)| within <= outside)
-                && part.share_in(&field.table.surface) <= ON_TABLE;
+                && part.share_in(&field.table()) <= ON_TABLE;
             !is_object
         })
     }

@@ -78,7 +78,7 @@ pub(crate) struct Pyramid<'a> {
 /// A cut at the coarsest size.
 pub(crate) struct CoarseCut {
     pub(crate) object: Bitmap,
-    labels: Vec<Label>,
+    pub(crate) labels: Vec<Label>,
     models: Models<3>,
     sampled: Option<Rect>,
 }
@@ -123,6 +123,23 @@ impl<'a> Pyramid<'a> {
             models,
             sampled,
         })
+    }
+
+    /// A cut at the coarsest size without what lies in the sure background.
+    ///
+    /// # Errors
+    /// [`MaskError::Empty`] if nothing of it is left.
+    pub(crate) fn within_known(&self, mut cut: CoarseCut) -> Result<CoarseCut, MaskError> {
+        for (label, known) in cut.labels.iter_mut().zip(&self.coarsest.labels) {
+            if known.is_sure() {
+                *label = *known;
+            }
+        }
+        cut.object = grab_cut::object_of(&cut.labels, self.coarsest.size());
+        if cut.object.count() == 0 {
+            return Err(MaskError::Empty);
+        }
+        Ok(cut)
     }
 
     /// Takes a cut up to the finest size.

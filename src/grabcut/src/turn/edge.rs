@@ -14,11 +14,13 @@ const BAND: usize = 2;
 const REACH: usize = 4;
 /// A mean needs at least so many pixels.
 const MIN_PIXELS: usize = 3;
+/// Weight of the network's odds, as a logarithm, against the share of the object.
+const ODDS_WEIGHT: f32 = 0.1;
 /// Series that differ by less than this, as a root of the mean square, say nothing.
 const NOISE: f32 = 0.01;
 
-/// The object with its edge where the courses show it.
-pub(crate) fn along_series(series: &PixelSeries, object: &Bitmap) -> Bitmap {
+/// The object with its edge where the courses show it, and the logarithms of each pixel's odds that it is object.
+pub(crate) fn along_series(series: &PixelSeries, odds: &[f32], object: &Bitmap) -> Bitmap {
     let outside = object.inverted();
     let band = object.dilated(BAND).and(&outside.dilated(BAND));
     let inner = [object.eroded(BAND), object.eroded(1)];
@@ -29,14 +31,15 @@ pub(crate) fn along_series(series: &PixelSeries, object: &Bitmap) -> Bitmap {
         }
         let (inside, outside) = (near(&inner, at, series), near(&outer, at, series));
         match inside.zip(outside) {
-            Some((inside, outside)) => share(series, at, &inside, &outside).unwrap_or(bit),
+            Some((inside, outside)) => share(series, at, &inside, &outside)
+                .map_or(bit, |share| share + ODDS_WEIGHT * odds[at] > 0.5),
             None => bit,
         }
     })
 }
 
-/// Whether most of what a pixel shows is the one and not the other; `None` if they hardly differ.
-fn share(series: &PixelSeries, at: usize, inside: &[f32], outside: &[f32]) -> Option<bool> {
+/// How much of what a pixel shows is the inside; `None` if it hardly differs from the outside.
+fn share(series: &PixelSeries, at: usize, inside: &[f32], outside: &[f32]) -> Option<f32> {
     let apart: Vec<f32> = inside.iter().zip(outside).map(|(i, o)| i - o).collect();
     let length = dot(&apart, &apart);
     if length < NOISE * NOISE * apart.len() as f32 {
@@ -44,7 +47,7 @@ fn share(series: &PixelSeries, at: usize, inside: &[f32], outside: &[f32]) -> Op
     }
     let own = series.mean(&[at]);
     let beyond: Vec<f32> = own.iter().zip(outside).map(|(own, o)| own - o).collect();
-    Some(dot(&beyond, &apart) > 0.5 * length)
+    Some(dot(&beyond, &apart) / length)
 }
 
 /// The mean course near a pixel of the first of some parts with enough pixels there.
@@ -85,7 +88,12 @@ mod tests {
         });
         let series = PixelSeries::new(&frames, (40, 20));
         let from = |left: usize| Bitmap::new((40, 20), (0..800).map(move |at| at % 40 >= left));
-        assert_eq!(along_series(&series, &from(15)), from(16));
-        assert_eq!(along_series(&series, &from(18)), from(16));
+        assert_eq!(along_series(&series, &[0.0; 800], &from(15)), from(16));
+        assert_eq!(along_series(&series, &[0.0; 800], &from(18)), from(16));
+        // A pixel that shows a fifth of the object is the object's if the network is sure of it.
+        let sure: Vec<f32> = (0..800)
+            .map(|at| if at % 40 == 15 { 4.0 } else { 0.0 })
+            .collect();
+        assert_eq!(along_series(&series, &sure, &from(16)), from(15));
     }
 }

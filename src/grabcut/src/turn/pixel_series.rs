@@ -36,11 +36,6 @@ impl PixelSeries {
         self.size
     }
 
-    /// How many numbers a course has.
-    pub(crate) fn length(&self) -> usize {
-        self.length
-    }
-
     /// The mean course of some pixels.
     pub(crate) fn mean(&self, pixels: &[usize]) -> Vec<f32> {
         let mut mean = vec![0.0_f32; self.length];
@@ -49,60 +44,12 @@ impl PixelSeries {
         mean
     }
 
-    /// The course of a pixel, averaged with those of its neighbours against noise.
-    pub(crate) fn smooth(&self, at: usize) -> Vec<f32> {
-        let (width, height) = self.size;
-        let (columns, rows) = (near(at % width, width), near(at / width, height));
-        let pixels = rows.flat_map(|row| columns.clone().map(move |column| row * width + column));
-        self.mean(&pixels.collect::<Vec<_>>())
-    }
-
-    /// The results of `each` for the smooth courses of all pixels.
-    pub(crate) fn map_smooth<T>(&self, mut each: impl FnMut(&[f32]) -> T) -> Vec<T> {
-        let (width, height) = self.size;
-        let mut results = Vec::with_capacity(width * height);
-        // The mean of three rows, and of three pixels of it.
-        let mut rows = vec![0.0_f32; self.length * width];
-        let mut course = vec![0.0_f32; self.length];
-        for y in 0..height {
-            rows.fill(0.0);
-            let above_and_below = near(y, height);
-            let many = above_and_below.len();
-            for row in above_and_below {
-                for (x, sum) in rows.chunks_exact_mut(self.length.max(1)).enumerate() {
-                    self.add(row * width + x, sum);
-                }
-            }
-            scale(&mut rows, many);
-            for x in 0..width {
-                course.fill(0.0);
-                let beside = near(x, width);
-                let many = beside.len();
-                for column in beside {
-                    let one = &rows[column * self.length..(column + 1) * self.length];
-                    course
-                        .iter_mut()
-                        .zip(one)
-                        .for_each(|(sum, one)| *sum += one);
-                }
-                scale(&mut course, many);
-                results.push(each(&course));
-            }
-        }
-        results
-    }
-
     fn add(&self, at: usize, sum: &mut [f32]) {
         let levels = &self.levels[at * self.length..(at + 1) * self.length];
         for (sum, &level) in sum.iter_mut().zip(levels) {
             *sum += self.linear[usize::from(level)];
         }
     }
-}
-
-/// A position of a side and its neighbours.
-fn near(at: usize, side: usize) -> std::ops::Range<usize> {
-    at.saturating_sub(1)..(at + 2).min(side)
 }
 
 fn scale(course: &mut [f32], many: usize) {
@@ -137,15 +84,13 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn the_courses_of_all_pixels_are_those_of_each() {
+    fn a_course_is_the_mean_of_linear_light() {
         let frame = |level: u8| RgbImage::from_fn(5, 4, |x, y| Rgb([level, 10 * x as u8, y as u8]));
         let series = PixelSeries::new(&[frame(0), frame(255)], (5, 4));
-        let all = series.map_smooth(<[f32]>::to_vec);
-        for (at, course) in all.iter().enumerate() {
-            let one = series.smooth(at);
-            let apart = course.iter().zip(&one).map(|(a, b)| (a - b).abs());
-            assert!(apart.fold(0.0, f32::max) < 1e-5, "{at}");
-        }
-        assert!((series.mean(&[7])[3] - 1.0).abs() < 1e-6);
+        let mean = series.mean(&[7, 8]);
+        assert_eq!((mean.len(), mean[0]), (6, 0.0));
+        assert!((mean[3] - 1.0).abs() < 1e-6);
+        let green = [20.0_f32, 30.0].map(|level| linear_from_srgb(level / 255.0));
+        assert!((mean[1] - (green[0] + green[1]) / 2.0).abs() < 1e-6);
     }
 }

@@ -8,14 +8,10 @@
 
 use image::RgbImage;
 
-use super::backdrop::Backdrop;
 use super::edge;
 use super::frame_shift;
+use super::network::Classes;
 use super::pixel_series::PixelSeries;
-use super::table::{Turntable, find_turntable};
-use super::table_model::{SeenTable, TableModel, TurnObservations};
-use super::temporal_evidence::{Curves, TemporalEvidence, luminance};
-use super::thin_parts::thin_parts;
 use crate::MaskError;
 use crate::bitmap::Bitmap;
 use crate::cut::grab_cut;
@@ -33,8 +29,6 @@ use crate::{Effort, Hints};
 pub const MIN_TURN_FRAMES: usize = 4;
 /// Frames that are sampled of a turn.
 pub const TURN_FRAMES: usize = 32;
-/// The table's model is learned at most so many times, each time from a better cut.
-const LEARNED: usize = 5;
 /// Frames are halved until they have at most so many pixels.
 const MAX_PIXELS: usize = 600_000;
 /// And once more for the first cut, until they have at most so many.
@@ -45,10 +39,8 @@ const BORDER: f64 = 0.01;
 const RING: f64 = 0.06;
 /// Share of the pixels within the ring that is taken for background at first.
 const SHARE: f64 = 0.7;
-/// The rows' ends are of use at first if they leave at least this share of the open pixels.
-const MIN_LEFT: f64 = 0.01;
-/// And at most this.
-const MAX_LEFT: f64 = 0.7;
+/// Weight of what the network says, in units of the log-likelihood.
+const NETWORK_WEIGHT: f32 = 2.0;
 /// Weight of the average colour against that of the current one.
 const COLOUR_WEIGHT: f32 = 1.0 / 3.0;
 /// Weight of the logarithms of the changes.
@@ -64,14 +56,6 @@ const MAX_CONTRAST: f32 = 100.0;
 const EDGE: f32 = 0.05;
 /// Added to a luminance, 0..=1, before its logarithm: noise counts little below.
 const DARK: f32 = 0.003;
-/// A pixel is white where all channels have at least this level.
-const WHITE: u8 = 250;
-/// And is so in this share of the frames.
-const WHITE_FRAMES: f64 = 0.9;
-/// Shorter thin parts of the object stay, pixels.
-const MIN_THIN_PART: usize = 6;
-/// What the table's model says at least of a pixel that is background at first, as a logarithm.
-const SURELY_TABLE: f32 = 2.0;
 
 /// Frames of a turn, all of one size, reduced to what the statistics need.
 #[derive(Debug, Clone)]
@@ -117,67 +101,26 @@ pub struct TurnStatistics {
     /// At half the size; `None` if the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
     pub(crate) series: PixelSeries,
-    /// The object as it was cut without the table's model, if it is about as dark as the table.
-    dark_object: Option<Bitmap>,
 }
 
 impl TurnStatistics {
-    /// Looks at the frames of a turn. A draft learns the table only once.
+    /// Looks at the frames of a turn.
     #[must_use]
-    pub fn new(turn: &TurnFrames, effort: Effort) -> Self {
+    pub fn new(turn: &TurnFrames) -> Self {
         let colours = LabTable::new();
-        let mut fine = TurnField::new(&turn.frames, &colours);
-        let mut coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
+        let classes = Classes::from_frames(&turn.frames);
+        let field = |frames: &[RgbImage]| TurnField::new(frames, &colours, classes.as_ref());
+        let fine = field(&turn.frames);
+        let coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
             let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
-            TurnField::new(&half, &colours)
+            field(&half)
         });
-        let series = PixelSeries::new(&turn.frames, fine.size);
-        let first = own_cut(&fine, coarse.as_ref());
-        let mut object = first.clone();
-        let mut model = None;
-        let before =
-            [Some(&fine), coarse.as_ref()].map(|field| field.map(TurnField::without_table));
-        let rounds = match effort {
-            Effort::Draft => 1,
-            Effort::Fine => LEARNED,
-        };
-        for round in 0..rounds {
-            if round > 0 {
-                let better =
-                    own_cut(&fine, coarse.as_ref()).filter(|cut| Some(cut) != object.as_ref());
-                if better.is_none() {
-                    break;
-                }
-                object = better;
-            }
-            let Some(learned) = object
-                .as_ref()
-                .and_then(|object| fine.table_model(&series, object))
-            else {
-                break;
-            };
-            for (field, (evidence, backdrop)) in [Some(&mut fine), coarse.as_mut()]
-                .into_iter()
-                .flatten()
-                .zip(before.iter().flatten())
-            {
-                field.evidence.clone_from(evidence);
-                field.backdrop.clone_from(backdrop);
-            }
-            fine.learn_table(&learned);
-            if let Some(coarse) = &mut coarse {
-                coarse.learn_table(&learned.halved());
-            }
-            model = Some(learned);
-        }
-        let is_dark = model.is_some_and(|model| !model.object_is_bright);
         Self {
             frames: turn.frames.len(),
             full: turn.full,
+            series: PixelSeries::new(&turn.frames, fine.size),
             fine,
             coarse,
-            series,
-            dark_object: first.filter(|_| is_dark),
         }
     }
 
@@ -216,7 +159,26 @@ impl TurnStatistics {
         self.fine.outline(&object)
     }
 
-    /// Whether anything moves: the median change of the brightness away from the table.
+    /// The overlap (intersection over union) with the object that is to be expected of a mask, if the network's
+    /// probabilities are right, and the mask where it is sure.
+    pub(crate) fn expected_overlap(&self, mask: &Bitmap, sure: &Bitmap) -> f32 {
+        let (mask, sure) = (self.downscaled(mask), self.downscaled(sure));
+        let (mut both, mut either) = (0.0, 0.0);
+        let pixels = mask.bits().iter().zip(sure.bits());
+        for ((&inside, &is_sure), odds) in pixels.zip(&self.fine.object_odds) {
+            let inside = f32::from(u8::from(inside));
+            let probability = if is_sure {
+                inside
+            } else {
+                1.0 / (1.0 + (-odds).exp())
+            };
+            both += inside * probability;
+            either += inside.max(probability);
+        }
+        both / either.max(1.0)
+    }
+
+    /// Whether anything moves: a quarter of the pixels changes its brightness.
     pub(crate) fn moves(&self) -> bool {
         let features = self.fine.features.iter();
         let mut changes: Vec<f32> = features.map(|feature| feature[3]).collect();
@@ -229,14 +191,6 @@ impl TurnStatistics {
     }
 }
 
-/// The object as the fields show it alone, in the size of the fine one.
-fn own_cut(fine: &TurnField, coarse: Option<&TurnField>) -> Option<Bitmap> {
-    match coarse {
-        Some(coarse) => coarse.own_cut().map(|object| object.enlarged(2, fine.size)),
-        None => fine.own_cut(),
-    }
-}
-
 /// Averages and changes of each pixel over the frames.
 #[derive(Debug)]
 pub(crate) struct TurnField {
@@ -246,19 +200,13 @@ pub(crate) struct TurnField {
     contrasts: Vec<[f32; 4]>,
     /// In which share of the frames there is an edge next to a pixel: a shadow's passes by, an outline stays.
     lasting: Vec<f32>,
-    /// Pixels that are background by the ends of their rows.
-    pub(crate) backdrop: Bitmap,
-    pub(crate) table: Turntable,
-    pub(crate) evidence: Vec<f32>,
-    pub(crate) temporal_evidence: TemporalEvidence,
-    /// What the table's model takes for the table; none without one.
-    pub(crate) seen_table: Option<SeenTable>,
-    /// Pixels that are white in nearly every frame.
-    pub(crate) white: Bitmap,
+    /// What the network says, as logarithms of odds: the object, and the table.
+    object_odds: Vec<f32>,
+    table_odds: Vec<f32>,
 }
 
 impl TurnField {
-    fn new(frames: &[RgbImage], colours: &LabTable) -> Self {
+    fn new(frames: &[RgbImage], colours: &LabTable, classes: Option<&Classes>) -> Self {
         let first = frames.first().filter(|frame| pixels(frame) > 0);
         let size = first.map_or((0, 0), RgbImage::dimensions);
         let size = (size.0 as usize, size.1 as usize);
@@ -267,10 +215,8 @@ impl TurnField {
         let mut square = vec![[0.0_f32; 2]; count];
         let mut difference = vec![[0.0_f32; 4]; count];
         let mut steps = vec![[0.0_f32; 4]; count];
-        let mut curves = Curves::new(frames.len(), count);
-        for (number, frame) in frames.iter().enumerate() {
+        for frame in frames {
             let lab: Vec<[f32; 3]> = frame.pixels().map(|p| colours.lab(p.0)).collect();
-            curves.add(number, &lab);
             let logs = smooth_logs(&lab, size);
             for (at, &[l, a, b]) in lab.iter().enumerate() {
                 sum[at].iter_mut().zip([l, a, b]).for_each(|(s, v)| *s += v);
@@ -313,85 +259,26 @@ impl TurnField {
         let contrasts: Vec<[f32; 4]> = (0..count).map(contrast).collect();
         let lasting = largest(&steps, size).into_iter().map(|steps| steps / many);
         let lasting: Vec<f32> = lasting.collect();
-        let temporal_evidence = curves.finish();
-        let table = find_turntable(&features, &lasting, &temporal_evidence, size);
-        let backdrop = Backdrop::new(&features, &table, size);
+        let odds = |of: fn(&Classes, (usize, usize)) -> Vec<f32>| {
+            classes.map_or_else(|| vec![0.0; count], |classes| of(classes, size))
+        };
         Self {
             size,
-            backdrop: backdrop.alike,
-            evidence: backdrop.evidence,
-            temporal_evidence,
-            seen_table: None,
-            white: white(frames, size),
-            table,
+            object_odds: odds(Classes::object),
+            table_odds: odds(Classes::table),
             features,
             contrasts,
             lasting,
         }
     }
-}
-
-impl TurnField {
-    /// What is evidence before the table is learned.
-    fn without_table(&self) -> (Vec<f32>, Bitmap) {
-        (self.evidence.clone(), self.backdrop.clone())
-    }
-
-    /// The object by what is known so far.
-    fn own_cut(&self) -> Option<Bitmap> {
-        let size = (self.size.0 as u32, self.size.1 as u32);
-        let border = ring(size, BORDER);
-        let open = (0..self.features.len()).map(|at| {
-            if border(at) {
-                Label::Background
-            } else {
-                Label::ProbablyObject
-            }
-        });
-        let mut labels: Vec<Label> = open.collect();
-        self.begin(&mut labels, SHARE).ok()?;
-        Some(grab_cut::object_of(&labels, self.size))
-    }
 
     /// Cuts at this size.
     fn begin(&self, labels: &mut [Label], share: f64) -> Result<Models<5>, MaskError> {
-        if !self.start_from_backdrop(labels) {
+        if !self.initialise_by_network(labels) {
             let size = (self.size.0 as u32, self.size.1 as u32);
             grab_cut::rank(self, labels, share, ring(size, RING));
         }
         start(self, labels, InitialModels::All, SMOOTHNESS)
-    }
-
-    /// The table's model, with what is known before it.
-    fn table_model(&self, series: &PixelSeries, object: &Bitmap) -> Option<TableModel> {
-        let light: Vec<f32> = self.light().into_iter().map(luminance).collect();
-        let change: Vec<f32> = self
-            .features
-            .iter()
-            .map(|f| (f[3] / CHANGE_WEIGHT).exp_m1())
-            .collect();
-        let seen = TurnObservations {
-            object,
-            surface: &self.table.surface,
-            light: &light,
-            change: &change,
-        };
-        TableModel::learn(series, &seen)
-    }
-
-    /// Takes what the table's model says as evidence.
-    fn learn_table(&mut self, model: &TableModel) {
-        for (at, evidence) in self.evidence.iter_mut().enumerate() {
-            let ratio = model.ratio[at];
-            *evidence = match (model.on_disc.bits()[at], self.table.surface.bits()[at]) {
-                (true, true) => ratio.min(-SURELY_TABLE),
-                (true, false) => ratio,
-                (false, _) => evidence.min(ratio),
-            };
-        }
-        let surely = model.alike(SURELY_TABLE).or(&self.table.surface);
-        self.backdrop = self.backdrop.minus(&model.on_disc).or(&surely);
-        self.seen_table = Some(model.seen());
     }
 
     /// The average brightness L of each pixel.
@@ -426,20 +313,33 @@ impl TurnField {
         (edges > 0.0).then_some(sum / edges)
     }
 
-    /// Takes what equals the ends of its row for background at first. False, and nothing is done, if that
-    /// leaves too little or too much for the object.
-    fn start_from_backdrop(&self, labels: &mut [Label]) -> bool {
+    /// What the network says of a part, as a mean of the logarithms of its pixels' odds: whether it is object.
+    pub(crate) fn odds(&self, part: &Bitmap) -> f32 {
+        let odds = part.bits().iter().zip(&self.object_odds);
+        let sum: f32 = odds.filter(|(bit, _)| **bit).map(|(_, odds)| odds).sum();
+        sum / part.count().max(1) as f32
+    }
+
+    /// What the network takes for the table.
+    pub(crate) fn table(&self) -> Bitmap {
+        let size = (self.size.0 as u32, self.size.1 as u32);
+        Bitmap::new(size, self.table_odds.iter().map(|&odds| odds > 0.0))
+    }
+
+    /// Takes what the network takes for background as such at first. False, and nothing is done, if that is all or
+    /// nothing of what is open.
+    fn initialise_by_network(&self, labels: &mut [Label]) -> bool {
         let open = |label: &Label| *label == Label::ProbablyObject;
-        let all = labels.iter().filter(|label| open(label)).count() as f64;
-        let pixels = labels.iter().zip(self.backdrop.bits());
-        let left = pixels
-            .filter(|(label, alike)| open(label) && !**alike)
-            .count() as f64;
-        if left < MIN_LEFT * all || left > MAX_LEFT * all {
+        let odds = labels.iter().zip(&self.object_odds);
+        let (object, background): (Vec<f32>, Vec<f32>) = odds
+            .filter(|(label, _)| open(label))
+            .map(|(_, &odds)| odds)
+            .partition(|&odds| odds > 0.0);
+        if object.is_empty() || background.is_empty() {
             return false;
         }
-        for (label, &alike) in labels.iter_mut().zip(self.backdrop.bits()) {
-            if open(label) && alike {
+        for (label, &odds) in labels.iter_mut().zip(&self.object_odds) {
+            if open(label) && odds <= 0.0 {
                 *label = Label::ProbablyBackground;
             }
         }
@@ -464,18 +364,13 @@ fn smooth_logs(lab: &[[f32; 3]], (width, height): (usize, usize)) -> Vec<f32> {
     smooth.collect()
 }
 
-/// The pixels that are white in nearly every frame: overexposed.
-fn white(frames: &[RgbImage], (width, height): (usize, usize)) -> Bitmap {
-    let mut times = vec![0_usize; width * height];
-    for frame in frames {
-        let pixels = frame.as_raw().chunks_exact(3);
-        for (times, pixel) in times.iter_mut().zip(pixels) {
-            *times += usize::from(pixel.iter().all(|&channel| channel >= WHITE));
-        }
+/// The luminance, 0..=1, of a lightness L.
+fn luminance(light: f32) -> f32 {
+    if light > 8.0 {
+        ((light + 16.0) / 116.0).powi(3)
+    } else {
+        light * 27.0 / 24389.0
     }
-    let least = (WHITE_FRAMES * frames.len() as f64).max(1.0);
-    let often = times.iter().map(|&times| times as f64 >= least);
-    Bitmap::new((width as u32, height as u32), often)
 }
 
 /// The largest contrast of each pixel to its eight neighbours.
@@ -516,7 +411,7 @@ impl Field<5> for TurnField {
     }
 
     fn evidence(&self, at: usize) -> f32 {
-        self.evidence[at]
+        NETWORK_WEIGHT * self.object_odds[at]
     }
 }
 
@@ -545,7 +440,7 @@ impl Field<5> for FrameInTurn<'_> {
     }
 
     fn evidence(&self, at: usize) -> f32 {
-        self.turn.evidence[self.in_turn(at)]
+        NETWORK_WEIGHT * self.turn.object_odds[self.in_turn(at)]
     }
 }
 
@@ -576,17 +471,8 @@ pub(crate) fn segment(
     let at_fine = levels.iter().position(|level| level.size() == fine.size);
     let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
     let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share)?;
-    if let Some(before) = &turn.dark_object {
-        change(&mut labels, fine.size, |object| {
-            fine.restored(object, before)
-        });
-    }
-    change(&mut labels, fine.size, |object| fine.completed(object));
     change(&mut labels, fine.size, |object| {
-        edge::along_series(&turn.series, object)
-    });
-    change(&mut labels, fine.size, |object| {
-        object.minus(&thin_parts(&turn.series, object, MIN_THIN_PART))
+        edge::along_series(&turn.series, &fine.object_odds, object)
     });
     // From where the object is on average to where it is in the frame.
     change(&mut labels, fine.size, |object| {
@@ -670,10 +556,27 @@ mod tests {
                 image::Rgb([level; 3])
             }));
         }
-        let field = TurnStatistics::new(&turn, Effort::Fine).fine;
+        let field = TurnStatistics::new(&turn).fine;
         let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
         let outline = field.outline(&all.map(|at, _| at / 80 < 30));
         let shadow = field.outline(&all.map(|at, _| at % 80 < 40));
         assert!(outline > 0.9 && shadow < 0.3, "{outline} {shadow}");
+    }
+
+    #[test]
+    fn the_expected_overlap_is_that_of_the_odds_and_of_what_is_sure() {
+        let mut turn = TurnFrames::new(80, 60);
+        (0..4).for_each(|_| turn.push(&RgbImage::new(80, 60)));
+        let mut statistics = TurnStatistics::new(&turn);
+        let odds = (0..80 * 60).map(|at| if at % 80 < 40 { 2.0 } else { -2.0 });
+        statistics.fine.object_odds = odds.collect();
+        let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
+        let (left, none) = (all.map(|at, _| at % 80 < 40), all.map(|_, _| false));
+        let probability = 1.0 / (1.0 + (-2.0_f32).exp());
+        let expected = probability / (2.0 - probability);
+        let found = statistics.expected_overlap(&left, &none);
+        assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+        assert!(statistics.expected_overlap(&left.inverted(), &none) < 0.1);
+        assert!((statistics.expected_overlap(&left, &all) - 1.0).abs() < 1e-6);
     }
 }

@@ -4,7 +4,7 @@
 //! Geometry and shade are found once, because nothing of them moves in the picture; a frame then costs little.
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
-use relit_grabcut::{Effort, TurnFrames, TurnStatistics};
+use relit_grabcut::{TurnFrames, TurnStatistics};
 
 /// What an object has that makes its mask difficult.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,7 +54,7 @@ impl Scene {
         let (width, height) = self.truth.dimensions();
         let mut turn = TurnFrames::new(width, height);
         self.frames.iter().for_each(|frame| turn.push(frame));
-        TurnStatistics::new(&turn, Effort::Fine)
+        TurnStatistics::new(&turn)
     }
 }
 

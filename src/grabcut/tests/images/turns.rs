@@ -1,11 +1,10 @@
 //! Masks by the turn of objects with holes, handles, dark parts and parts in shade, and what their check says.
 
-use image::{GrayImage, RgbImage};
-use relit_grabcut::{Effort, Hints, MaskCheck, ShapeCheck, TurnFrames, TurnStatistics};
+use image::GrayImage;
+use relit_grabcut::{Effort, Hints, MaskCheck, ShapeCheck};
 
 use super::turn_scene::{Difficulty, Scene, TROUBLES, scene};
 use super::{by_seeds, segment_turn};
-use relit_test_support::disc::{HEIGHT, WIDTH, in_disc, seeds_image};
 
 /// Small enough to be made on the fly.
 const SMALL: (u32, u32) = (176, 132);
@@ -190,43 +189,30 @@ fn a_stroke_over_the_opening_of_a_handle_is_told() {
     assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
 }
 
-/// A disc with its own pattern that stands still before stripes that move.
-fn still_disc() -> Vec<RgbImage> {
-    let level = |x: u32, y: u32, at: u32| {
-        let (u, v) = (f64::from(x), f64::from(y));
-        let pattern = 25.0 * (u * 0.5).sin() * (v * 0.4 + u * 0.1).cos();
-        if in_disc(x, y) {
-            (180.0 + pattern) as u8
-        } else {
-            30 + 40 * ((x + 5 * at) / 10 % 4) as u8
-        }
-    };
-    let frame = |at| RgbImage::from_fn(WIDTH, HEIGHT, |x, y| image::Rgb([level(x, y, at); 3]));
-    (0..24).map(frame).collect()
-}
-
 #[test]
-fn background_in_a_mask_object_outside_and_holes_are_found_by_what_they_show() {
-    let frames = still_disc();
-    let mut turn = TurnFrames::new(WIDTH, HEIGHT);
-    frames.iter().for_each(|frame| turn.push(frame));
-    let turn = TurnStatistics::new(&turn, Effort::Fine);
+fn background_in_a_mask_and_object_outside_are_found() {
+    let scene = scene(Difficulty::DarkPart, SMALL, 24, SEED);
+    let turn = scene.statistics();
+    let is_object = |x: u32, y: u32| scene.truth.get_pixel(x, y).0[0] > 0;
     let shape = |inside: &dyn Fn(u32, u32) -> bool| {
-        let mask = seeds_image(|x, y| if inside(x, y) { 255 } else { 0 });
+        let mask = GrayImage::from_fn(SMALL.0, SMALL.1, |x, y| {
+            image::Luma([if inside(x, y) { 255 } else { 0 }])
+        });
         let check = MaskCheck::new(&mask, &turn).unwrap();
-        check.shape(&frames[0], Effort::Fine).unwrap().unwrap()
+        let shape = check.shape(&scene.frames[0], Effort::Fine).unwrap();
+        shape.unwrap()
     };
-    let right = shape(&in_disc);
+    let right = shape(&is_object);
     assert!(right.faults().is_empty(), "{right:?}");
-    let beside = |x, y| (70..85).contains(&x) && (20..40).contains(&y);
-    let leaking = shape(&|x, y| in_disc(x, y) || beside(x, y));
-    assert!(leaking.leaks.iter().any(|part| part.px > 60), "{leaking:?}");
-    let half = shape(&|x, y| in_disc(x, y) && x < 52);
-    assert!(half.missing.iter().any(|part| part.px > 60), "{half:?}");
-    let hole = |x: u32, y: u32| (f64::from(x) - 46.0).hypot(f64::from(y) - 32.0) <= 6.0;
-    let holed = shape(&|x, y| in_disc(x, y) && !hole(x, y));
-    assert!(holed.missing.iter().any(|part| part.px > 60), "{holed:?}");
-    for wrong in [leaking, half, holed] {
+    let beside = |x, y| (10..30).contains(&x) && (20..40).contains(&y);
+    let leaking = shape(&|x, y| is_object(x, y) || beside(x, y));
+    assert!(
+        leaking.leaks.iter().any(|part| part.px > 300),
+        "{leaking:?}"
+    );
+    let half = shape(&|x, y| is_object(x, y) && x < 88);
+    assert!(half.missing.iter().any(|part| part.px > 300), "{half:?}");
+    for wrong in [leaking, half] {
         assert!(!wrong.faults().is_empty(), "{wrong:?}");
     }
 }
