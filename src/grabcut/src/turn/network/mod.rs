@@ -109,7 +109,7 @@ pub(crate) struct Classes {
 }
 
 impl Classes {
-    /// Of frames of one size, spread evenly over the turn; none without a pixel.
+    /// Of frames of one size, spread evenly over the turn; none if they show no object.
     pub(crate) fn from_frames(frames: &[RgbImage]) -> Option<Self> {
         let network = Network::shipped()?;
         let (width, height) = frames.first()?.dimensions();
@@ -139,10 +139,12 @@ impl Classes {
         };
         let odds =
             |class: usize| (0..width * height).map(move |at| log_odds(&logits_at(at), class));
-        Some(Self {
+        let object: Vec<f32> = odds(OBJECT).collect();
+        let table = odds(TABLE).collect();
+        object.iter().any(|&odds| odds > 0.0).then_some(Self {
             size: (width, height),
-            object: odds(OBJECT).collect(),
-            table: odds(TABLE).collect(),
+            object,
+            table,
         })
     }
 
@@ -262,10 +264,10 @@ mod tests {
     }
 
     #[test]
-    fn no_frame_and_the_smallest_one_do_no_harm() {
+    fn without_an_object_the_network_says_nothing() {
         assert!(Classes::from_frames(&[]).is_none());
         assert!(Classes::from_frames(&[RgbImage::new(0, 0)]).is_none());
-        let odds = Classes::from_frames(&vec![RgbImage::new(1, 1); 4]).unwrap();
-        assert_eq!(odds.object((1, 1)).len(), 1);
+        assert!(Classes::from_frames(&vec![RgbImage::new(1, 1); 4]).is_none());
+        assert!(Classes::from_frames(&vec![RgbImage::new(330, 33); 4]).is_none());
     }
 }
