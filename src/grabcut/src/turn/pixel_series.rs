@@ -3,7 +3,7 @@
 use image::RgbImage;
 
 /// The courses of all pixels: three numbers for each frame.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct PixelSeries {
     /// sRGB levels, pixel by pixel.
     levels: Vec<u8>,

@@ -92,7 +92,7 @@ fn pixels(image: &RgbImage) -> usize {
 }
 
 /// What the frames of a turn tell about each pixel; any number of cuts can be made with it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct TurnStatistics {
     frames: usize,
     /// The frames' width and height.
@@ -122,6 +122,16 @@ impl TurnStatistics {
             fine,
             coarse,
         }
+    }
+
+    /// The same if the network says nothing.
+    fn without_network(&self) -> Self {
+        let mut silent = self.clone();
+        let fields = [Some(&mut silent.fine), silent.coarse.as_mut()];
+        for field in fields.into_iter().flatten() {
+            field.object_odds.fill(0.0);
+        }
+        silent
     }
 
     /// That there are enough frames.
@@ -192,7 +202,7 @@ impl TurnStatistics {
 }
 
 /// Averages and changes of each pixel over the frames.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct TurnField {
     pub(crate) size: (usize, usize),
     features: Vec<[f32; 5]>,
@@ -453,7 +463,7 @@ impl FrameInTurn<'_> {
     }
 }
 
-/// Cuts the object out by what the turn tells, on the pixels of `frame`.
+/// Cuts the object out by what the turn tells, on the pixels of `frame`; without the network if nothing is found by it.
 pub(crate) fn segment(
     frame: &RgbImage,
     turn: &TurnStatistics,
@@ -461,6 +471,20 @@ pub(crate) fn segment(
     effort: Effort,
 ) -> Result<Bitmap, MaskError> {
     turn.check()?;
+    match cut_out(frame, turn, hints, effort) {
+        Err(MaskError::Empty | MaskError::Everything) => {
+            cut_out(frame, &turn.without_network(), hints, effort)
+        }
+        cut => cut,
+    }
+}
+
+fn cut_out(
+    frame: &RgbImage,
+    turn: &TurnStatistics,
+    hints: &Hints,
+    effort: Effort,
+) -> Result<Bitmap, MaskError> {
     if turn.full != frame.dimensions() {
         return Err(MaskError::FewFrames { found: 0 });
     }
