@@ -189,7 +189,7 @@ fn cut_unclosed(
     Ok(mask)
 }
 
-/// The pixels of which hints leave no doubt.
+/// The pixels that hints decide.
 fn sure(hints: &Hints, size: (u32, u32)) -> Result<Bitmap, MaskError> {
     let labels = Trimap::new(hints, size)?.labels;
     Ok(Bitmap::new(

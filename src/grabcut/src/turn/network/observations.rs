@@ -29,7 +29,7 @@ const DARK: f32 = 0.02;
 const EDGE: f32 = 0.05;
 /// A pixel is white where all channels have at least this level.
 const WHITE: u8 = 250;
-/// Keeps the share of a variance defined where nothing changes.
+/// Keeps the share of a variance defined if a pixel does not change.
 const NO_CHANGE: f32 = 1e-5;
 /// A larger amplitude of a harmonic counts as this.
 const MAX_AMPLITUDE: f32 = 2.0;
