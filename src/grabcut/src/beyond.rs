@@ -4,6 +4,8 @@
 //! teaches them that its colours are background. So where a cut reaches a side of its rectangle, it is made again with
 //! what is beyond that side as open as the inside. If the object goes on there, that cut counts, without what is outside.
 
+use std::ops::Range;
+
 use image::RgbImage;
 use relit_data::geometry::Rect;
 
@@ -60,6 +62,24 @@ struct Side {
 }
 
 impl Side {
+    /// Of lines that cross the side, with the places on them; `at` says which pixel a place on a line is.
+    fn new(
+        name: &'static str,
+        lines: Range<usize>,
+        at: impl Fn(usize, usize) -> usize,
+        inside: usize,
+        beyond: Vec<usize>,
+    ) -> Self {
+        let pixels = lines.map(|line| {
+            let beyond = beyond.iter().map(|&place| at(line, place)).collect();
+            (at(line, inside), beyond)
+        });
+        Self {
+            name,
+            pixels: pixels.collect(),
+        }
+    }
+
     /// The sides of a part of an image.
     fn all(part: Rect, image: &RgbImage) -> [Self; 4] {
         let (columns, rows) = (image.width() as usize, image.height() as usize);
@@ -68,30 +88,28 @@ impl Side {
         let bottom = (top + part.h as usize).min(rows);
         let deep = |length: u32| (f64::from(length) * DEPTH) as usize;
         let (across, down) = (deep(part.w), deep(part.h));
-        let beside = |name, inside: usize, beyond: Vec<usize>| {
-            let row = |y: usize| {
-                let at = move |x: usize| y * columns + x;
-                (at(inside), beyond.iter().copied().map(at).collect())
-            };
-            let pixels = (top..bottom).map(row).collect();
-            Self { name, pixels }
-        };
-        let above = |name, inside: usize, beyond: Vec<usize>| {
-            let column = |x: usize| {
-                let at = move |y: usize| y * columns + x;
-                (at(inside), beyond.iter().copied().map(at).collect())
-            };
-            let pixels = (left..right).map(column).collect();
-            Self { name, pixels }
-        };
+        let row = |y: usize, x: usize| y * columns + x;
+        let column = |x: usize, y: usize| y * columns + x;
         let before = |end: usize, deep: usize| (end.saturating_sub(deep)..end).rev().collect();
         let after =
             |begin: usize, deep: usize, end: usize| (begin..end.min(begin + deep)).collect();
         [
-            beside("left", left, before(left, across)),
-            beside("right", right - 1, after(right, across, columns)),
-            above("upper", top, before(top, down)),
-            above("lower", bottom - 1, after(bottom, down, rows)),
+            Self::new("left", top..bottom, row, left, before(left, across)),
+            Self::new(
+                "right",
+                top..bottom,
+                row,
+                right - 1,
+                after(right, across, columns),
+            ),
+            Self::new("upper", left..right, column, top, before(top, down)),
+            Self::new(
+                "lower",
+                left..right,
+                column,
+                bottom - 1,
+                after(bottom, down, rows),
+            ),
         ]
     }
 

@@ -4,5 +4,6 @@ pub(crate) mod edge;
 pub(crate) mod frame_shift;
 pub(crate) mod network;
 pub(crate) mod pixel_series;
+mod smooth;
 pub(crate) mod statistics;
 pub(crate) mod thin_parts;

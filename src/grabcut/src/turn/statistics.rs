@@ -12,6 +12,7 @@ use super::edge;
 use super::frame_shift;
 use super::network::Classes;
 use super::pixel_series::PixelSeries;
+use super::smooth::smooth;
 use crate::MaskError;
 use crate::bitmap::Bitmap;
 use crate::cut::grab_cut;
@@ -358,20 +359,9 @@ impl TurnField {
 }
 
 /// The logarithms of the luminances, each averaged with its neighbours against noise.
-fn smooth_logs(lab: &[[f32; 3]], (width, height): (usize, usize)) -> Vec<f32> {
+fn smooth_logs(lab: &[[f32; 3]], size: (usize, usize)) -> Vec<f32> {
     let light: Vec<f32> = lab.iter().map(|lab| luminance(lab[0]) + DARK).collect();
-    let three = |values: &[f32], at: usize, step: usize, place: usize, length: usize| {
-        let before = if place > 0 { at - step } else { at };
-        let after = if place + 1 < length { at + step } else { at };
-        (values[before] + values[at] + values[after]) / 3.0
-    };
-    let all = 0..lab.len();
-    let beside = all
-        .clone()
-        .map(|at| three(&light, at, 1, at % width, width));
-    let beside: Vec<f32> = beside.collect();
-    let smooth = all.map(|at| three(&beside, at, width, at / width, height).ln());
-    smooth.collect()
+    smooth(&light, size).into_iter().map(f32::ln).collect()
 }
 
 /// The luminance, 0..=1, of a lightness L.

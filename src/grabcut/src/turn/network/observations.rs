@@ -17,6 +17,7 @@
 use image::RgbImage;
 
 use super::layers::Planes;
+use crate::turn::smooth::smooth;
 
 /// How many planes there are.
 pub(super) const PLANES: usize = 20;
@@ -161,7 +162,10 @@ pub(super) fn observe(frames: &[RgbImage], unit: usize) -> Planes {
             if wave % 2 == 0 { cos } else { sin }
         });
         let luma: Vec<f32> = frame.pixels().map(|pixel| luma(pixel.0)).collect();
-        let logs = logs(&luma, (width, height));
+        let logs: Vec<f32> = smooth(&luma, (width, height))
+            .into_iter()
+            .map(|mean| (mean + DARK).ln())
+            .collect();
         for ((at, sums), pixel) in sums.iter_mut().enumerate().zip(frame.pixels()) {
             let step = |is_there: bool, by: usize| {
                 if is_there {
@@ -197,20 +201,4 @@ pub(super) fn observe(frames: &[RgbImage], unit: usize) -> Planes {
 
 fn luma([red, green, blue]: [u8; 3]) -> f32 {
     (0.299 * f32::from(red) + 0.587 * f32::from(green) + 0.114 * f32::from(blue)) / 255.0
-}
-
-/// The logarithms, each of the mean over three by three pixels; the frame's border is repeated.
-fn logs(luma: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
-    let three = |values: &[f32], at: usize, step: usize, place: usize, length: usize| {
-        let before = if place > 0 { at - step } else { at };
-        let after = if place + 1 < length { at + step } else { at };
-        (values[before] + values[at] + values[after]) / 3.0
-    };
-    let all = 0..luma.len();
-    let beside: Vec<f32> = all
-        .clone()
-        .map(|at| three(luma, at, 1, at % width, width))
-        .collect();
-    let mean = all.map(|at| three(&beside, at, width, at / width, height));
-    mean.map(|mean| (mean + DARK).ln()).collect()
 }
