@@ -28,12 +28,14 @@ import turns
 
 SIZES = [(320, 240), (320, 240), (320, 180)]
 LOW = 192
-FRAMES = [32, 32, 32, 16, 12]
+FRAMES = [32, 32, 32, 16, 12, 8]
 SHOTS = 3
 # As src/grabcut/src/turn/network/observations.rs describes them.
 PLANES, EDGE, DARK, WHITE = 18, 0.05, 0.02, 250
 MIRRORED_STEPS, WAVES = (14, 16), ((1, 7), (2, 9))
 WIDTHS, NARROW, HEAD = (24, 40, 56, 72, 88), 12, 16
+# Residual blocks of the encoder at each size.
+RESIDUAL = (0, 1, 2, 2, 2)
 BATCH = 8
 
 
@@ -104,8 +106,8 @@ def drawn_shape(size, rng):
             angle = rng.uniform(0, 6.28)
             end = at + 1.3 * r * np.array([np.cos(angle), np.sin(angle)])
             cv2.line(canvas, whole(middle), whole(end), 255, int(max(1.5, rng.uniform(0.03, 0.25) * r) * fine))
-    for _ in range(rng.choice([0, 0, 1, 1, 2])):
-        at, r = middle + rng.uniform(-0.6, 0.6, 2) * radius, radius * rng.uniform(0.1, 0.35)
+    for _ in range(rng.choice([0, 1, 1, 2])):
+        at, r = middle + rng.uniform(-0.5, 0.5, 2) * radius, radius * rng.uniform(0.1, 0.45)
         cv2.ellipse(canvas, whole(at), whole((r, r * rng.uniform(0.5, 1.2))), 0, 0, 360, 0, -1)
     cover = cv2.resize(canvas.astype(np.float32) / 255, size, interpolation=cv2.INTER_AREA)
     _, labels, figures, _ = cv2.connectedComponentsWithStats((cover > 0.5).astype(np.uint8), connectivity=8)
@@ -248,6 +250,18 @@ def layer(inputs, outputs):
     return nn.Sequential(nn.Conv2d(inputs, outputs, 3, 1, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True))
 
 
+class Residual(nn.Module):
+    """Two layers whose output is added to their input: nothing at first (He et al., "Deep residual learning", 2016)."""
+
+    def __init__(self, width):
+        super().__init__()
+        self.layers = nn.ModuleList([layer(width, width), layer(width, width)[:2]])
+        nn.init.zeros_(self.layers[1][1].weight)
+
+    def forward(self, planes):
+        return planes + self.layers[1](self.layers[0](planes))
+
+
 class Network(nn.Module):
     """As src/grabcut/src/turn/network/mod.rs: logits of object, table and room."""
 
@@ -255,7 +269,8 @@ class Network(nn.Module):
         super().__init__()
         sizes = [PLANES + 2, *WIDTHS]
         pairs = list(zip(sizes, sizes[1:]))
-        self.encoder = nn.ModuleList(nn.Sequential(layer(a, b), layer(b, b)) for a, b in pairs)
+        blocks = [[Residual(b) for _ in range(many)] for b, many in zip(WIDTHS, RESIDUAL)]
+        self.encoder = nn.ModuleList(nn.Sequential(layer(a, b), layer(b, b), *of) for (a, b), of in zip(pairs, blocks))
         decoder = [nn.Sequential(layer(b + a, a), layer(a, a)) for a, b in pairs[:0:-1]]
         decoder[-1] = decoder[-1][:1]
         self.decoder = nn.ModuleList(decoder)
@@ -346,6 +361,11 @@ def batches(folder, rng):
         if len(orders[height]) < BATCH:
             orders[height] = [paths[height][at] for at in rng.permutation(len(paths[height]))]
         seen, shares = apart(np.stack([varied(np.load(orders[height].pop()), rng) for _ in range(BATCH)]))
+        # Some upright, as frames of a phone are.
+        if rng.random() < 0.12:
+            wide = height * 3 // 4 // 32 * 32
+            begin = int(rng.integers(0, seen.shape[3] - wide + 1) * 0.5 + (seen.shape[3] - wide) * 0.25)
+            seen, shares = (planes[..., begin : begin + wide] for planes in (seen, shares))
         # Some smaller, as small frames are.
         by = rng.choice([1, 2, 4], p=[0.82, 0.13, 0.05])
         if by > 1:
@@ -369,7 +389,7 @@ def train(arguments):
     rng = np.random.default_rng(0)
     network, mean = (Network().to(memory_format=torch.channels_last) for _ in range(2))
     if arguments.begin:
-        network.load_state_dict(torch.load(arguments.begin))
+        network.load_state_dict(torch.load(arguments.begin), strict=False)
     mean.load_state_dict(network.state_dict())
     optimiser = torch.optim.AdamW(network.parameters(), lr=arguments.learning_rate, weight_decay=1e-2)
     validation = sorted((arguments.data / "validation").glob("*.npy"))
@@ -403,16 +423,26 @@ def train(arguments):
     write(mean, arguments.output)
 
 
+def layers(network):
+    """The name of each convolution with its normalisation, or without one, and of its layer."""
+    modules = dict(network.named_modules())
+    for name, module in modules.items():
+        if isinstance(module, nn.Conv2d):
+            parent = name.rpartition(".")[0]
+            normal = modules.get(f"{parent}.1")
+            has_normal = isinstance(normal, nn.BatchNorm2d)
+            yield parent if has_normal else name, module, normal if has_normal else None
+
+
 def write(network, path):
     """The weights as safetensors of 16-bit numbers, with the normalisation in the convolutions."""
     tensors = {}
-    groups = {"encoder": network.encoder, "decoder": network.decoder}
-    named = [(f"{part}.{size}.{at}", one) for part, sizes in groups.items() for size, layers in enumerate(sizes) for at, one in enumerate(layers)]
-    for name, (convolution, normal, _) in [*named, ("narrow", network.narrow), ("head.0", network.head[0])]:
-        scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
-        tensors[f"{name}.weight"] = convolution.weight * scale[:, None, None, None]
-        tensors[f"{name}.bias"] = normal.bias - normal.running_mean * scale
-    tensors["head.1.weight"], tensors["head.1.bias"] = network.head[1].weight, network.head[1].bias
+    for name, convolution, normal in layers(network):
+        weight, bias = convolution.weight, convolution.bias
+        if normal:
+            scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
+            weight, bias = weight * scale[:, None, None, None], normal.bias - normal.running_mean * scale
+        tensors[f"{name}.weight"], tensors[f"{name}.bias"] = weight, bias
     header, data = {}, b""
     for name, tensor in sorted(tensors.items()):
         own = tensor.detach().numpy().astype(np.float16).tobytes()
@@ -433,20 +463,12 @@ def read(path):
         numbers = np.frombuffer(data[first:last], np.float16).reshape(entry["shape"])
         tensors[name] = torch.from_numpy(numbers.astype(np.float32))
     network = Network()
-    state = network.state_dict()
-    for name in state:
-        layer_name, part, what = name.rsplit(".", 2) if not name.startswith("head.1.") else ("", "", "")
-        if name.startswith("head.1."):
-            state[name] = tensors[name]
-        elif part == "0":
-            state[name] = tensors[f"{layer_name}.weight"]
-        elif what == "bias":
-            state[name] = tensors[f"{layer_name}.bias"]
-        elif what in ("weight", "running_var"):
-            state[name] = torch.ones_like(state[name])
-        else:
-            state[name] = torch.zeros_like(state[name])
-    network.load_state_dict(state)
+    with torch.no_grad():
+        for name, convolution, normal in layers(network):
+            convolution.weight.copy_(tensors[f"{name}.weight"])
+            (normal or convolution).bias.copy_(tensors[f"{name}.bias"])
+            if normal:
+                nn.init.ones_(normal.weight)
     return network
 
 

@@ -153,6 +153,29 @@ impl Convolution {
     }
 }
 
+/// A step from planes to others of the same size.
+#[derive(Debug)]
+pub(super) enum Layer {
+    Plain(Convolution),
+    /// What the convolutions make of the planes is added to them.
+    Residual([Convolution; 2]),
+}
+
+impl Layer {
+    pub(super) fn apply(&self, planes: Planes) -> Planes {
+        match self {
+            Self::Plain(convolution) => convolution.apply(&planes),
+            Self::Residual([first, second]) => {
+                let mut sum = second.apply(&first.apply(&planes));
+                for (sum, value) in sum.values.iter_mut().zip(&planes.values) {
+                    *sum += value;
+                }
+                sum
+            }
+        }
+    }
+}
+
 /// The weighted sums of a group of channels for a group of columns from `x` on.
 #[inline(always)]
 fn sums(
@@ -232,6 +255,22 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_residual_layer_adds_to_its_planes() {
+        let planes = Planes {
+            values: numbers(3 * 20 * 4),
+            width: 20,
+            height: 4,
+        };
+        let convolution = |bias: f32, is_rectified| {
+            Convolution::new(&[0.0; 3 * 3 * 9], vec![bias; 3], is_rectified)
+        };
+        let layer = Layer::Residual([convolution(1.0, true), convolution(-0.5, false)]);
+        let result = layer.apply(planes.clone());
+        let mut pairs = result.values.iter().zip(&planes.values);
+        assert!(pairs.all(|(found, value)| (found - (value - 0.5)).abs() < 1e-6));
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! It sees what the frames show at each pixel over the whole turn ([`observations`]), with at most 320 pixels on the longer
 //! side. An encoder and a decoder with connections between layers of the same size (Ronneberger, Fischer and Brox, "U-Net",
-//! 2015) have learned from rendered turns; `docs/methods/masking.md` says from which.
+//! 2015), and residual blocks (He et al., "Deep residual learning", 2016), have learned from rendered turns;
+//! `docs/methods/masking.md` says from which.
 
 mod layers;
 mod observations;
@@ -12,7 +13,7 @@ use image::RgbImage;
 use image::imageops::thumbnail;
 use safetensors::SafeTensors;
 
-use layers::{Convolution, Planes};
+use layers::{Convolution, Layer, Planes};
 use observations::observe;
 
 /// Frames are reduced to at most so many pixels on their longer side.
@@ -30,9 +31,9 @@ const WEIGHTS: &[u8] = include_bytes!("weights.safetensors");
 #[derive(Debug)]
 struct Network {
     /// For each size of the encoder, from the largest on.
-    encoder: Vec<Vec<Convolution>>,
+    encoder: Vec<Vec<Layer>>,
     /// For each size of the decoder, from the smallest on.
-    decoder: Vec<Vec<Convolution>>,
+    decoder: Vec<Vec<Layer>>,
     /// Before the full size is reached.
     narrow: Convolution,
     /// At the full size.
@@ -57,10 +58,18 @@ impl Network {
             let biases = numbers(&format!("{name}.bias"))?;
             Some(Convolution::new(&weights, biases, is_rectified))
         };
+        let plain_or_residual = |name: &str| {
+            if let Some(plain) = layer(name, true) {
+                return Some(Layer::Plain(plain));
+            }
+            let first = layer(&format!("{name}.layers.0"), true)?;
+            let second = layer(&format!("{name}.layers.1"), false)?;
+            Some(Layer::Residual([first, second]))
+        };
         // The layers of a size: as many as there are.
-        let layers = |part: &str, level: usize| -> Vec<Convolution> {
+        let layers = |part: &str, level: usize| -> Vec<Layer> {
             (0..)
-                .map_while(|number| layer(&format!("{part}.{level}.{number}"), true))
+                .map_while(|number| plain_or_residual(&format!("{part}.{level}.{number}")))
                 .collect()
         };
         Some(Self {
@@ -75,10 +84,10 @@ impl Network {
 
     /// The classes' logits for observations whose sides are multiples of 2 to the power of [`LEVELS`].
     fn apply(&self, seen: Planes) -> Planes {
-        let through = |planes: Planes, layers: &[Convolution]| {
+        let through = |planes: Planes, layers: &[Layer]| {
             layers
                 .iter()
-                .fold(planes, |planes, layer| layer.apply(&planes))
+                .fold(planes, |planes, layer| layer.apply(planes))
         };
         let mut sizes = vec![seen];
         for layers in &self.encoder {
@@ -94,7 +103,8 @@ impl Network {
         }
         let planes = self.narrow.apply(&planes).doubled();
         let planes = sizes.iter().fold(planes, Planes::followed_by);
-        through(planes, &self.head)
+        let [first, last] = &self.head;
+        last.apply(&first.apply(&planes))
     }
 }
 
@@ -126,16 +136,15 @@ impl Classes {
             frames.to_vec()
         };
         let (width, height) = reduced.first()?.dimensions();
+        let (width, height) = (width as usize, height as usize);
         let logits = network.apply(observe(&reduced, 1 << LEVELS));
-        let area = logits.area();
         if logits.channels() != CLASSES {
             return None;
         }
-        let (width, height) = (width as usize, height as usize);
         let logits = &logits;
         let logits_at = move |at: usize| {
             let at = at / width * logits.width + at % width;
-            std::array::from_fn(|class| logits.values[class * area + at])
+            std::array::from_fn(|class| logits.values[class * logits.area() + at])
         };
         let odds =
             |class: usize| (0..width * height).map(move |at| log_odds(&logits_at(at), class));
@@ -251,9 +260,9 @@ mod tests {
         (17, [0.274_61, 0.658_76, 0.0]),
     ];
     const LOGITS: [[f32; 3]; 3] = [
-        [1.564_83, -1.483_65, -5.946_28],
-        [-0.964_25, -3.273_68, 1.040_32],
-        [-0.928_15, 2.000_61, 1.550_52],
+        [2.253_17, -6.312_78, -4.707_21],
+        [-3.436_07, -7.947_62, 0.076_02],
+        [-0.268_42, 6.251_66, 0.980_03],
     ];
 
     #[test]
