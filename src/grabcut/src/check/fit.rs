@@ -153,7 +153,7 @@ impl<'a> MaskCheck<'a> {
     fn shown(&self, parts: &Bitmap, says: impl Fn(f32) -> bool) -> Bitmap {
         let least = self.mask.count() as f64 * SMALL;
         parts.parts_where(Connectivity::Eight, |component, part| {
-            let odds = || self.turn.fine.odds(&self.turn.downscaled(&part()));
+            let odds = || self.turn.field.odds(&self.turn.downscaled(&part()));
             component.area as f64 >= least && says(odds())
         })
     }
@@ -183,7 +183,7 @@ impl<'a> MaskCheck<'a> {
     /// Such a part is the object's if it moves with the rest of the mask rather than with what is around, and is not
     /// table.
     fn without_cut_off(&self, leaks: &Bitmap) -> Bitmap {
-        let field = &self.turn.fine;
+        let field = &self.turn.field;
         leaks.parts_where(Connectivity::Eight, |component, part| {
             if leaks.is_inside(component) {
                 return true;

@@ -2,18 +2,19 @@
 //!
 //! A pixel at the edge shows a mixture of object and background. Over a turn the background, the light, or both change,
 //! which makes the mixture measurable: its course lies between those of the neighbouring object and background.
-//! The pixel belongs to the one that it shows more of.
+//! Its share of the object decides to which of them it belongs.
 
 use crate::bitmap::Bitmap;
 
 use super::pixel_series::{PixelSeries, dot};
 
-/// So many pixels on each side of the edge are decided.
-const BAND: usize = 2;
 /// Object and background are looked for within so many pixels.
-const REACH: usize = 4;
+const REACH: usize = 3;
 /// A mean needs at least so many pixels.
 const MIN_PIXELS: usize = 3;
+/// A pixel that shows at least this share of the object is the object's, if the network's odds are even. Less than half:
+/// what is brighter than a level can be takes more of a pixel than it seems to.
+const LEAST_SHARE: f32 = 0.4;
 /// Weight of the network's odds, as a logarithm, against the share of the object.
 const ODDS_WEIGHT: f32 = 0.1;
 /// Series that differ by less than this, as a root of the mean square, say nothing.
@@ -22,9 +23,8 @@ const NOISE: f32 = 0.01;
 /// The object with its edge where the courses show it, and the logarithms of each pixel's odds that it is object.
 pub(crate) fn along_series(series: &PixelSeries, odds: &[f32], object: &Bitmap) -> Bitmap {
     let outside = object.inverted();
-    let band = object.dilated(BAND).and(&outside.dilated(BAND));
-    let inner = [object.eroded(BAND), object.eroded(1)];
-    let outer = [outside.eroded(BAND), outside.eroded(1)];
+    let (inner, outer) = (object.eroded(1), outside.eroded(1));
+    let band = inner.inverted().minus(&outer);
     object.map(|at, bit| {
         if !band.bits()[at] {
             return bit;
@@ -32,7 +32,7 @@ pub(crate) fn along_series(series: &PixelSeries, odds: &[f32], object: &Bitmap) 
         let (inside, outside) = (near(&inner, at, series), near(&outer, at, series));
         match inside.zip(outside) {
             Some((inside, outside)) => share(series, at, &inside, &outside)
-                .map_or(bit, |share| share + ODDS_WEIGHT * odds[at] > 0.5),
+                .map_or(bit, |share| share + ODDS_WEIGHT * odds[at] > LEAST_SHARE),
             None => bit,
         }
     })
@@ -50,19 +50,15 @@ fn share(series: &PixelSeries, at: usize, inside: &[f32], outside: &[f32]) -> Op
     Some(dot(&beyond, &apart) / length)
 }
 
-/// The mean course near a pixel of the first of some parts with enough pixels there.
-fn near(parts: &[Bitmap], at: usize, series: &PixelSeries) -> Option<Vec<f32>> {
+/// The mean course of a part near a pixel; `None` if too little of it is there.
+fn near(part: &Bitmap, at: usize, series: &PixelSeries) -> Option<Vec<f32>> {
     let (width, height) = series.size();
     let (x, y) = (at % width, at / width);
-    let within = |part: &Bitmap| {
-        let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
-        let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
-        let pixels = rows.flat_map(|row| columns.clone().map(move |column| row * width + column));
-        pixels.filter(|&at| part.bits()[at]).collect::<Vec<_>>()
-    };
-    let mut found = parts.iter().map(within);
-    let enough = found.find(|pixels| pixels.len() >= MIN_PIXELS);
-    enough.map(|pixels| series.mean(&pixels))
+    let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
+    let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
+    let pixels = rows.flat_map(|row| columns.clone().map(move |column| row * width + column));
+    let pixels: Vec<usize> = pixels.filter(|&at| part.bits()[at]).collect();
+    (pixels.len() >= MIN_PIXELS).then(|| series.mean(&pixels))
 }
 
 #[cfg(test)]
@@ -89,7 +85,7 @@ mod tests {
         let series = PixelSeries::new(&frames, (40, 20));
         let from = |left: usize| Bitmap::new((40, 20), (0..800).map(move |at| at % 40 >= left));
         assert_eq!(along_series(&series, &[0.0; 800], &from(15)), from(16));
-        assert_eq!(along_series(&series, &[0.0; 800], &from(18)), from(16));
+        assert_eq!(along_series(&series, &[0.0; 800], &from(17)), from(16));
         // A pixel that shows a fifth of the object is the object's if the network is sure of it.
         let sure: Vec<f32> = (0..800)
             .map(|at| if at % 40 == 15 { 4.0 } else { 0.0 })

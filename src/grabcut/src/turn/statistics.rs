@@ -20,9 +20,7 @@ use crate::cut::grab_cut::{
     DIRECTIONS_AHEAD, Field, Label, Models, SMOOTHNESS, change, neighbour, squared_distance,
 };
 use crate::cut::lab::LabTable;
-use crate::cut::pyramid::{
-    InitialModels, Level, RgbField, ascend, half_image, levels, refine, start,
-};
+use crate::cut::pyramid::{InitialModels, RgbField, ascend, half_image, levels, start};
 use crate::hints::trimap::Trimap;
 use crate::{Effort, Hints};
 
@@ -32,8 +30,6 @@ pub const MIN_TURN_FRAMES: usize = 4;
 pub const TURN_FRAMES: usize = 32;
 /// Frames are halved until they have at most so many pixels.
 const MAX_PIXELS: usize = 600_000;
-/// And once more for the first cut, until they have at most so many.
-const COARSE_PIXELS: usize = 100_000;
 /// Share of the frame's shorter side that is background at each border.
 const BORDER: f64 = 0.01;
 /// Share of the frame's shorter side from which the background is learned at first.
@@ -41,7 +37,7 @@ const RING: f64 = 0.06;
 /// Share of the pixels within the ring that is taken for background at first.
 const SHARE: f64 = 0.7;
 /// Weight of what the network says, in units of the log-likelihood.
-const NETWORK_WEIGHT: f32 = 2.0;
+const NETWORK_WEIGHT: f32 = 1.3;
 /// Weight of the average colour against that of the current one.
 const COLOUR_WEIGHT: f32 = 1.0 / 3.0;
 /// Weight of the logarithms of the changes.
@@ -98,9 +94,7 @@ pub struct TurnStatistics {
     frames: usize,
     /// The frames' width and height.
     pub(crate) full: (u32, u32),
-    pub(crate) fine: TurnField,
-    /// At half the size; `None` if the fine one is small enough for the first cut.
-    coarse: Option<TurnField>,
+    pub(crate) field: TurnField,
     pub(crate) series: PixelSeries,
 }
 
@@ -110,28 +104,19 @@ impl TurnStatistics {
     pub fn new(turn: &TurnFrames) -> Self {
         let colours = LabTable::new();
         let classes = Classes::from_frames(&turn.frames);
-        let field = |frames: &[RgbImage]| TurnField::new(frames, &colours, classes.as_ref());
-        let fine = field(&turn.frames);
-        let coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
-            let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
-            field(&half)
-        });
+        let field = TurnField::new(&turn.frames, &colours, classes.as_ref());
         Self {
             frames: turn.frames.len(),
             full: turn.full,
-            series: PixelSeries::new(&turn.frames, fine.size),
-            fine,
-            coarse,
+            series: PixelSeries::new(&turn.frames, field.size),
+            field,
         }
     }
 
     /// The same if the network says nothing.
     fn without_network(&self) -> Self {
         let mut silent = self.clone();
-        let fields = [Some(&mut silent.fine), silent.coarse.as_mut()];
-        for field in fields.into_iter().flatten() {
-            field.object_odds.fill(0.0);
-        }
+        silent.field.object_odds.fill(0.0);
         silent
     }
 
@@ -146,13 +131,13 @@ impl TurnStatistics {
 
     /// The frames are so many times larger: a power of two.
     pub(crate) fn factor(&self) -> usize {
-        let ratio = (self.full.0 as usize).div_ceil(self.fine.size.0.max(1));
+        let ratio = (self.full.0 as usize).div_ceil(self.field.size.0.max(1));
         ratio.next_power_of_two()
     }
 
     /// A bitmap of the frames' size in that of the statistics.
     pub(crate) fn downscaled(&self, object: &Bitmap) -> Bitmap {
-        let ((columns, rows), factor) = (self.fine.size, self.factor());
+        let ((columns, rows), factor) = (self.field.size, self.factor());
         let is_set = |at: usize| {
             let (x, y) = (at % columns * factor, at / columns * factor);
             object.bits().get(y * self.full.0 as usize + x) == Some(&true)
@@ -167,7 +152,7 @@ impl TurnStatistics {
     /// the contrast there, 0..=1.
     pub(crate) fn outline(&self, object: &Bitmap) -> f32 {
         let object = self.downscaled(object);
-        self.fine.outline(&object)
+        self.field.outline(&object)
     }
 
     /// The overlap (intersection over union) with the object that is to be expected of a mask, if the network's
@@ -176,7 +161,7 @@ impl TurnStatistics {
         let (mask, sure) = (self.downscaled(mask), self.downscaled(sure));
         let (mut both, mut either) = (0.0, 0.0);
         let pixels = mask.bits().iter().zip(sure.bits());
-        for ((&inside, &is_sure), odds) in pixels.zip(&self.fine.object_odds) {
+        for ((&inside, &is_sure), odds) in pixels.zip(&self.field.object_odds) {
             let inside = f32::from(u8::from(inside));
             let probability = if is_sure {
                 inside
@@ -191,7 +176,7 @@ impl TurnStatistics {
 
     /// Whether anything moves: a quarter of the pixels changes its brightness.
     pub(crate) fn moves(&self) -> bool {
-        let features = self.fine.features.iter();
+        let features = self.field.features.iter();
         let mut changes: Vec<f32> = features.map(|feature| feature[3]).collect();
         let upper = changes.len() * 3 / 4;
         if changes.is_empty() {
@@ -283,8 +268,8 @@ impl TurnField {
         }
     }
 
-    /// Cuts at this size.
-    fn begin(&self, labels: &mut [Label], share: f64) -> Result<Models<5>, MaskError> {
+    /// Cuts.
+    fn cut(&self, labels: &mut [Label], share: f64) -> Result<Models<5>, MaskError> {
         if !self.initialise_by_network(labels) {
             let size = (self.size.0 as u32, self.size.1 as u32);
             grab_cut::rank(self, labels, share, ring(size, RING));
@@ -480,28 +465,36 @@ fn cut_out(
     }
     let table = LabTable::new();
     let (known, share) = known(hints, frame.dimensions())?;
-    let levels = levels(frame, known, COARSE_PIXELS);
-    let fine = &turn.fine;
-    let at_fine = levels.iter().position(|level| level.size() == fine.size);
-    let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
-    let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share)?;
-    change(&mut labels, fine.size, |object| {
-        edge::along_series(&turn.series, &fine.object_odds, object)
+    let levels = levels(frame, known, MAX_PIXELS);
+    let field = &turn.field;
+    let (own, finer) = levels
+        .split_last()
+        .ok_or(MaskError::FewFrames { found: 0 })?;
+    let mut labels = own.labels.clone();
+    let mut models = field.cut(&mut labels, share)?;
+    change(&mut labels, field.size, |object| {
+        edge::along_series(&turn.series, &field.object_odds, object)
     });
     // From where the object is on average to where it is in the frame.
-    change(&mut labels, fine.size, |object| {
-        let pixels = levels[at_fine].image.pixels();
+    change(&mut labels, field.size, |object| {
+        let pixels = own.image.pixels();
         let light: Vec<f32> = pixels.map(|pixel| table.lab(pixel.0)[0]).collect();
-        let by = frame_shift::shift(&fine.light(), &light, object, fine.size);
-        frame_shift::moved(object, by, fine.size)
+        let by = frame_shift::shift(&field.light(), &light, object, field.size);
+        frame_shift::moved(object, by, field.size)
     });
-    let field = |steps, image| FrameInTurn {
-        turn: fine,
+    let in_frame = |steps, image| FrameInTurn {
+        turn: field,
         frame: RgbField::new(image, &table),
         factor: 2_usize << steps,
     };
-    let finer = &levels[..at_fine];
-    Ok(ascend(finer, labels, fine.size, &mut models, effort, field))
+    Ok(ascend(
+        finer,
+        labels,
+        field.size,
+        &mut models,
+        effort,
+        in_frame,
+    ))
 }
 
 /// What is known of each pixel: hints, and that the object does not touch the frame's border. With it
@@ -538,24 +531,6 @@ fn ring(size: (u32, u32), share: f64) -> impl Fn(usize) -> bool {
     }
 }
 
-/// The cut at the turn's own size; `levels` begins with that size.
-fn cut_turn(
-    turn: &TurnStatistics,
-    levels: &[Level<'_>],
-    share: f64,
-) -> Result<(Vec<Label>, Models<5>), MaskError> {
-    let mut labels = levels[0].labels.clone();
-    let (Some(coarser), Some(coarse)) = (levels.get(1), &turn.coarse) else {
-        let models = turn.fine.begin(&mut labels, share)?;
-        return Ok((labels, models));
-    };
-    let mut coarse_labels = coarser.labels.clone();
-    let mut models = coarse.begin(&mut coarse_labels, share)?;
-    let size = coarse.size;
-    refine(&turn.fine, &mut labels, &coarse_labels, size, &mut models);
-    Ok((labels, models))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -570,7 +545,7 @@ mod tests {
                 image::Rgb([level; 3])
             }));
         }
-        let field = TurnStatistics::new(&turn).fine;
+        let field = TurnStatistics::new(&turn).field;
         let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
         let outline = field.outline(&all.map(|at, _| at / 80 < 30));
         let shadow = field.outline(&all.map(|at, _| at % 80 < 40));
@@ -583,7 +558,7 @@ mod tests {
         (0..4).for_each(|_| turn.push(&RgbImage::new(80, 60)));
         let mut statistics = TurnStatistics::new(&turn);
         let odds = (0..80 * 60).map(|at| if at % 80 < 40 { 2.0 } else { -2.0 });
-        statistics.fine.object_odds = odds.collect();
+        statistics.field.object_odds = odds.collect();
         let all = Bitmap::new((80, 60), std::iter::repeat_n(true, 80 * 60));
         let (left, none) = (all.map(|at, _| at % 80 < 40), all.map(|_, _| false));
         let probability = 1.0 / (1.0 + (-2.0_f32).exp());
