@@ -19,7 +19,7 @@ const SMALL: f64 = 0.001;
 /// frame's width.
 const WHISKER: f64 = 0.04;
 /// What the turn says of a part is clear from these odds on, as a logarithm.
-const CLEAR: f32 = 4.0;
+const CLEAR: f32 = 4.5;
 /// And gives reason to look at more frames from these on.
 const SUSPECT: f32 = 1.0;
 /// A part of the mask with more than this share of table is not an object that the frame's border cuts off.
