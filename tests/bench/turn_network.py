@@ -1,9 +1,9 @@
 """The network that tells object, table and room in a turn (src/grabcut/src/turn/network): its data and its training.
 
-    python turn_network.py make MESHES PANORAMAS DATA --views 500 --drawings 800
-    python turn_network.py train DATA --minutes 60 -o src/grabcut/src/turn/network/weights.safetensors
+    python turn_network.py make MESHES PANORAMAS DATA --views 560 --drawings 1700
+    python turn_network.py train DATA --minutes 180 -o src/grabcut/src/turn/network/weights.safetensors
 
-With the packages of requirements-network.txt. A third of the turns are flat drawings: shapes that no mesh has, rooms of
+With the packages of requirements-network.txt. Half of the turns are flat drawings: shapes that no mesh has, rooms of
 stripes and spots, tables that fill the lower border, or none. The others are those of turns.py, of other objects and panoramas
 than its `make` takes. DATA/train and DATA/validation get one file a turn: the observations and the shares of room, table
 and object, as 16-bit numbers.
@@ -251,7 +251,7 @@ def layer(inputs, outputs):
 
 
 class Residual(nn.Module):
-    """Two layers whose output is added to their input: nothing at first (He et al., "Deep residual learning", 2016)."""
+    """Two layers whose output, nothing at first, is added to their input (as He et al., "Deep residual learning", 2016)."""
 
     def __init__(self, width):
         super().__init__()
@@ -384,12 +384,19 @@ def prepared(source):
             yield ready
 
 
+def begin(network, path):
+    """Takes the weights of a checkpoint; residual blocks that it lacks begin as nothing."""
+    missing, unknown = network.load_state_dict(torch.load(path), strict=False)
+    if unknown or any(".layers." not in name for name in missing):
+        raise SystemExit(f"{path} has other layers than the network")
+
+
 def train(arguments):
     torch.manual_seed(0)
     rng = np.random.default_rng(0)
     network, mean = (Network().to(memory_format=torch.channels_last) for _ in range(2))
     if arguments.begin:
-        network.load_state_dict(torch.load(arguments.begin), strict=False)
+        begin(network, arguments.begin)
     mean.load_state_dict(network.state_dict())
     optimiser = torch.optim.AdamW(network.parameters(), lr=arguments.learning_rate, weight_decay=1e-2)
     validation = sorted((arguments.data / "validation").glob("*.npy"))
@@ -423,8 +430,8 @@ def train(arguments):
     write(mean, arguments.output)
 
 
-def layers(network):
-    """The name of each convolution with its normalisation, or without one, and of its layer."""
+def convolutions(network):
+    """Of each convolution the name of its layer, itself, and its normalisation or None."""
     modules = dict(network.named_modules())
     for name, module in modules.items():
         if isinstance(module, nn.Conv2d):
@@ -437,7 +444,7 @@ def layers(network):
 def write(network, path):
     """The weights as safetensors of 16-bit numbers, with the normalisation in the convolutions."""
     tensors = {}
-    for name, convolution, normal in layers(network):
+    for name, convolution, normal in convolutions(network):
         weight, bias = convolution.weight, convolution.bias
         if normal:
             scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
@@ -464,7 +471,7 @@ def read(path):
         tensors[name] = torch.from_numpy(numbers.astype(np.float32))
     network = Network()
     with torch.no_grad():
-        for name, convolution, normal in layers(network):
+        for name, convolution, normal in convolutions(network):
             convolution.weight.copy_(tensors[f"{name}.weight"])
             (normal or convolution).bias.copy_(tensors[f"{name}.bias"])
             if normal:
@@ -493,15 +500,15 @@ def main():
     making = verbs.add_parser("make")
     for name in ("meshes", "panoramas", "data"):
         making.add_argument(name, type=pathlib.Path)
-    making.add_argument("--views", type=int, default=500)
-    making.add_argument("--drawings", type=int, default=800)
+    making.add_argument("--views", type=int, default=560)
+    making.add_argument("--drawings", type=int, default=1700)
     making.add_argument("--seed", type=int, default=0)
     making.set_defaults(run=make)
     training = verbs.add_parser("train")
     training.add_argument("data", type=pathlib.Path)
     training.add_argument("--minutes", type=float, default=60)
     training.add_argument("--learning-rate", type=float, default=3e-3)
-    training.add_argument("--from", dest="begin", type=pathlib.Path, help="a checkpoint to begin with")
+    training.add_argument("--from", dest="begin", type=pathlib.Path, help="a checkpoint (.pt) to begin with")
     training.add_argument("-o", "--output", type=pathlib.Path, required=True)
     training.set_defaults(run=train)
     comparing = verbs.add_parser("parity")

@@ -1,5 +1,5 @@
-//! The layers of a convolutional network, on the processor: planes of numbers, convolutions of 3 x 3, and changes of
-//! size by two.
+//! The layers of a convolutional network, on the processor: planes of numbers, convolutions of 3 x 3, alone or
+//! in residual blocks, and changes of size by two.
 
 use pulp::Arch;
 
@@ -153,7 +153,7 @@ impl Convolution {
     }
 }
 
-/// A step from planes to others of the same size.
+/// A step from planes to others of the same size. A plain one may change their number.
 #[derive(Debug)]
 pub(super) enum Layer {
     Plain(Convolution),

@@ -41,7 +41,7 @@ struct Network {
 }
 
 impl Network {
-    /// The network that is part of the program; none if its weights cannot be read.
+    /// The network that is part of the program, of the layers that its weights name; none if they cannot be read.
     fn shipped() -> Option<Self> {
         let tensors = SafeTensors::deserialize(WEIGHTS).ok()?;
         let numbers = |name: &str| {
