@@ -237,7 +237,7 @@ pub(crate) fn start<const D: usize>(
 }
 
 /// Decides a band along the coarse result's edge; elsewhere the coarse result stays.
-pub(crate) fn refine<const D: usize>(
+fn refine<const D: usize>(
     field: &impl Field<D>,
     labels: &mut [Label],
     coarse: &[Label],

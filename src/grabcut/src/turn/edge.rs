@@ -12,15 +12,15 @@ use super::pixel_series::{PixelSeries, dot};
 const REACH: usize = 3;
 /// A mean needs at least so many pixels.
 const MIN_PIXELS: usize = 3;
-/// A pixel that shows at least this share of the object is the object's, if the network's odds are even. Less than half:
-/// what is brighter than a level can be takes more of a pixel than it seems to.
+/// A pixel that shows more than this share of the object is the object's, if the network's odds are even. Less than
+/// half: of a mixture with a background that is brighter than the levels go, nearly all seems to be background.
 const LEAST_SHARE: f32 = 0.4;
 /// Weight of the network's odds, as a logarithm, against the share of the object.
 const ODDS_WEIGHT: f32 = 0.1;
 /// Series that differ by less than this, as a root of the mean square, say nothing.
 const NOISE: f32 = 0.01;
 
-/// The object with its edge where the courses show it, and the logarithms of each pixel's odds that it is object.
+/// The object with its edge where the courses show it; `odds` are the logarithms of the odds that a pixel is object.
 pub(crate) fn along_series(series: &PixelSeries, odds: &[f32], object: &Bitmap) -> Bitmap {
     let outside = object.inverted();
     let (inner, outer) = (object.eroded(1), outside.eroded(1));
@@ -86,6 +86,24 @@ mod tests {
         let from = |left: usize| Bitmap::new((40, 20), (0..800).map(move |at| at % 40 >= left));
         assert_eq!(along_series(&series, &[0.0; 800], &from(15)), from(16));
         assert_eq!(along_series(&series, &[0.0; 800], &from(17)), from(16));
+        // Nearly half is enough, less is not.
+        let mixed = |share: f64| {
+            [30_u8, 220, 90, 150].map(|room| {
+                RgbImage::from_fn(40, 20, |x, _| {
+                    let object = if x < 15 { 0.0 } else { 1.0 };
+                    let object = if x == 15 { share } else { object };
+                    let light = |level: f64| (level / 255.0).powf(2.2);
+                    let mixed = object * light(120.0) + (1.0 - object) * light(f64::from(room));
+                    Rgb([(255.0 * mixed.powf(1.0 / 2.2)).round() as u8; 3])
+                })
+            })
+        };
+        let edge_at = |share: f64| {
+            let series = PixelSeries::new(&mixed(share), (40, 20));
+            along_series(&series, &[0.0; 800], &from(16))
+        };
+        assert_eq!(edge_at(0.46), from(15));
+        assert_eq!(edge_at(0.34), from(16));
         // A pixel that shows a fifth of the object is the object's if the network is sure of it.
         let sure: Vec<f32> = (0..800)
             .map(|at| if at % 40 == 15 { 4.0 } else { 0.0 })

@@ -28,7 +28,7 @@ use crate::{Effort, Hints};
 pub const MIN_TURN_FRAMES: usize = 4;
 /// Frames that are sampled of a turn.
 pub const TURN_FRAMES: usize = 32;
-/// Frames are halved until they have at most so many pixels.
+/// Frames are halved until they have at most so many pixels; the object is cut at that size.
 const MAX_PIXELS: usize = 600_000;
 /// Share of the frame's shorter side that is background at each border.
 const BORDER: f64 = 0.01;
@@ -268,7 +268,7 @@ impl TurnField {
         }
     }
 
-    /// Cuts.
+    /// Cuts the object out at this size. The first guess is the network's, or that the frame's ring is background.
     fn cut(&self, labels: &mut [Label], share: f64) -> Result<Models<5>, MaskError> {
         if !self.initialise_by_network(labels) {
             let size = (self.size.0 as u32, self.size.1 as u32);
