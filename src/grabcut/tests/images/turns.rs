@@ -68,16 +68,18 @@ fn holes_stay_open_and_dark_and_shaded_parts_stay_in() {
 #[test]
 #[ignore = "minutes: the figures of docs/results/masks.md"]
 fn larger_turns_are_cut_as_well() {
+    let mut wrong = Vec::new();
     for trouble in TROUBLES {
         for seed in [9_001, 9_002, 9_003] {
             let (iou, right) = figures(trouble, (640, 480), 32, seed);
-            println!(
-                "{trouble:?} {seed}: IoU {iou:.4}, critical part {:.1} %",
-                100.0 * right
-            );
-            assert!(iou > MIN_IOU && right > MIN_RIGHT, "{trouble:?} {seed}");
+            let percent = 100.0 * right;
+            println!("{trouble:?} {seed}: IoU {iou:.4}, critical part {percent:.1} %");
+            if iou < MIN_IOU || right < MIN_RIGHT {
+                wrong.push((trouble, seed));
+            }
         }
     }
+    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 #[test]
