@@ -18,9 +18,11 @@ const SMALL: f64 = 0.001;
 /// A thin part of the mask that does not belong to the object is a whisker from this length on, as a share of the
 /// frame's width.
 const WHISKER: f64 = 0.04;
-/// What the turn says of a part is clear from these odds on, as a logarithm.
+/// That a part of the mask is background is clear from these odds on, as a logarithm.
 const CLEAR: f32 = 4.5;
-/// And gives reason to look at more frames from these on.
+/// That a part outside is object, from these.
+const CLEAR_OBJECT: f32 = 2.0;
+/// What gives reason to look at more frames from these on.
 const SUSPECT: f32 = 1.0;
 /// A part of the mask with more than this share of table is not an object that the frame's border cuts off.
 const ON_TABLE: f64 = 0.5;
@@ -125,7 +127,7 @@ impl<'a> MaskCheck<'a> {
             CLEAR
         };
         let is_background = |odds: f32| odds < -clear;
-        let is_object = |odds: f32| odds > clear;
+        let is_object = |odds: f32| odds > clear.min(CLEAR_OBJECT);
         let undecided = self.shown(&leaks, |odds| !is_background(odds) && !is_object(odds));
         let leaks = self.shown(&leaks, is_background);
         let whiskers = self.whiskers(&own);
