@@ -128,7 +128,7 @@ impl<'a> MaskCheck<'a> {
         };
         let is_background = |odds: f32| odds < -clear;
         let is_object = |odds: f32| odds > clear.min(CLEAR_OBJECT);
-        let undecided = self.shown(&leaks, |odds| !is_background(odds) && !is_object(odds));
+        let undecided = self.shown(&leaks, |odds| odds.abs() <= clear);
         let leaks = self.shown(&leaks, is_background);
         let whiskers = self.whiskers(&own);
         let missing = self.shown(&missing, is_object);
