@@ -10,21 +10,16 @@ and object, as 16-bit numbers.
 """
 
 import argparse
-import concurrent.futures
-import json
 import math
 import pathlib
-import struct
-import time
 
 import cv2
 import numpy as np
 import torch
-from torch import nn
 from torch.nn import functional
-from torch.nn.functional import interpolate
 
 import turns
+import unet
 
 SIZES = [(320, 240), (320, 240), (320, 180)]
 LOW = 192
@@ -33,9 +28,8 @@ SHOTS = 3
 # As src/grabcut/src/turn/network/observations.rs describes them.
 PLANES, EDGE, DARK, WHITE = 18, 0.05, 0.02, 250
 MIRRORED_STEPS, WAVES = (14, 16), ((1, 7), (2, 9))
-WIDTHS, NARROW, HEAD = (24, 40, 56, 72, 88), 12, 16
-# Residual blocks of the encoder at each size.
-RESIDUAL = (0, 1, 2, 2, 2)
+# Object, table, room.
+CLASSES = 3
 BATCH = 8
 
 
@@ -246,51 +240,6 @@ def make(arguments):
             save(folder / f"{number:05}-drawing.npy", frames, cover, rng)
 
 
-def layer(inputs, outputs):
-    return nn.Sequential(nn.Conv2d(inputs, outputs, 3, 1, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True))
-
-
-class Residual(nn.Module):
-    """Two layers whose output, nothing at first, is added to their input (as He et al., "Deep residual learning", 2016)."""
-
-    def __init__(self, width):
-        super().__init__()
-        self.layers = nn.ModuleList([layer(width, width), layer(width, width)[:2]])
-        nn.init.zeros_(self.layers[1][1].weight)
-
-    def forward(self, planes):
-        return planes + self.layers[1](self.layers[0](planes))
-
-
-class Network(nn.Module):
-    """As src/grabcut/src/turn/network/mod.rs: logits of object, table and room."""
-
-    def __init__(self):
-        super().__init__()
-        sizes = [PLANES + 2, *WIDTHS]
-        pairs = list(zip(sizes, sizes[1:]))
-        blocks = [[Residual(b) for _ in range(many)] for b, many in zip(WIDTHS, RESIDUAL)]
-        self.encoder = nn.ModuleList(nn.Sequential(layer(a, b), layer(b, b), *of) for (a, b), of in zip(pairs, blocks))
-        decoder = [nn.Sequential(layer(b + a, a), layer(a, a)) for a, b in pairs[:0:-1]]
-        decoder[-1] = decoder[-1][:1]
-        self.decoder = nn.ModuleList(decoder)
-        self.narrow = layer(WIDTHS[0], NARROW)
-        self.head = nn.Sequential(layer(NARROW + sizes[0], HEAD), nn.Conv2d(HEAD, 3, 3, 1, 1))
-
-    def forward(self, seen):
-        many, _, height, width = seen.shape
-        across = torch.linspace(-1, 1, width).expand(many, 1, height, width)
-        down = torch.linspace(-1, 1, height)[:, None].expand(many, 1, height, width)
-        sizes = [torch.cat([seen, across, down], 1)]
-        for layers in self.encoder:
-            sizes.append(layers(functional.avg_pool2d(sizes[-1], 2)))
-        planes = sizes.pop()
-        for layers in self.decoder:
-            planes = layers(torch.cat([interpolate(planes, scale_factor=2.0), sizes.pop()], 1))
-        planes = interpolate(self.narrow(planes), scale_factor=2.0)
-        return self.head(torch.cat([planes, sizes[0]], 1))
-
-
 def varied(turn, rng):
     """A turn mirrored, begun elsewhere, run backwards, with other colours, brightness and scales of the observations."""
     turn = turn.copy()
@@ -320,17 +269,8 @@ def apart(turns_):
 
 
 def loss(logits, shares):
-    """Cross-entropy, four times as much along the object's outline, and half of what Dice's coefficient lacks."""
-    counts = shares.sum(1, keepdim=True)
-    log = functional.log_softmax(logits.float(), 1)
-    of_object = shares[:, :1]
-    near = functional.max_pool2d(of_object, 7, 1, 3) + functional.max_pool2d(-of_object, 7, 1, 3) > 0.5
-    weight = counts * (1 + 3 * near.float())
-    entropy = (-(shares * log).sum(1, keepdim=True) * weight).sum() / weight.sum()
-    found = log.exp()[:, :1] * counts
-    total = lambda of: of.sum((1, 2, 3))
-    dice = (2 * total(found * of_object) + 1) / (total(found) + total(of_object) + 1)
-    return entropy + 0.5 * (1 - dice).mean()
+    entropy = -(shares * functional.log_softmax(logits, 1)).sum(1, keepdim=True)
+    return unet.loss(logits[:, :1] - logits[:, 1:].logsumexp(1, keepdim=True), entropy, shares)
 
 
 @torch.no_grad()
@@ -375,120 +315,23 @@ def batches(folder, rng):
         yield seen, shares
 
 
-def prepared(source):
-    """What a generator yields, each made while the one before is used."""
-    with concurrent.futures.ThreadPoolExecutor(1) as pool:
-        upcoming = pool.submit(next, source)
-        while True:
-            ready, upcoming = upcoming.result(), pool.submit(next, source)
-            yield ready
-
-
-def begin(network, path):
-    """Takes the weights of a checkpoint; residual blocks that it lacks begin as nothing."""
-    missing, unknown = network.load_state_dict(torch.load(path), strict=False)
-    if unknown or any(".layers." not in name for name in missing):
-        raise SystemExit(f"{path} has other layers than the network")
-
-
 def train(arguments):
-    torch.manual_seed(0)
-    rng = np.random.default_rng(0)
-    network, mean = (Network().to(memory_format=torch.channels_last) for _ in range(2))
-    if arguments.begin:
-        begin(network, arguments.begin)
-    mean.load_state_dict(network.state_dict())
-    optimiser = torch.optim.AdamW(network.parameters(), lr=arguments.learning_rate, weight_decay=1e-2)
     validation = sorted((arguments.data / "validation").glob("*.npy"))
-    begun, recent = time.monotonic(), []
-    for step, (seen, shares) in enumerate(prepared(batches(arguments.data / "train", rng))):
-        done = (time.monotonic() - begun) / 60 / arguments.minutes
-        if done >= 1:
-            break
-        for group in optimiser.param_groups:
-            group["lr"] = arguments.learning_rate * min(1, step / 100 + 0.01) * (0.5 + 0.5 * math.cos(math.pi * done) + 0.002)
-        network.train()
-        with torch.autocast("cpu", torch.bfloat16):
-            logits = network(seen)
-        value = loss(logits, shares)
-        optimiser.zero_grad()
-        value.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
-        recent = [*recent[-99:], value.item()]
-        decay = min(0.995, (step + 1) / (step + 10))
-        with torch.no_grad():
-            for averaged, own in zip(mean.parameters(), network.parameters()):
-                averaged.lerp_(own, 1 - decay)
-            for averaged, own in zip(mean.buffers(), network.buffers()):
-                averaged.copy_(own)
-        if step % 500 == 499:
-            print(f"step {step + 1}, loss {np.mean(recent):.4f}, overlap {turns.mean(overlaps(mean, validation))}", flush=True)
-            torch.save(mean.state_dict(), arguments.output.with_suffix(".pt"))
-    print(f"{step} steps, overlap {turns.mean(overlaps(mean, validation))}")
-    torch.save(mean.state_dict(), arguments.output.with_suffix(".pt"))
-    write(mean, arguments.output)
-
-
-def convolutions(network):
-    """Of each convolution the name of its layer, itself, and its normalisation or None."""
-    modules = dict(network.named_modules())
-    for name, module in modules.items():
-        if isinstance(module, nn.Conv2d):
-            parent = name.rpartition(".")[0]
-            normal = modules.get(f"{parent}.1")
-            has_normal = isinstance(normal, nn.BatchNorm2d)
-            yield parent if has_normal else name, module, normal if has_normal else None
-
-
-def write(network, path):
-    """The weights as safetensors of 16-bit numbers, with the normalisation in the convolutions."""
-    tensors = {}
-    for name, convolution, normal in convolutions(network):
-        weight, bias = convolution.weight, convolution.bias
-        if normal:
-            scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
-            weight, bias = weight * scale[:, None, None, None], normal.bias - normal.running_mean * scale
-        tensors[f"{name}.weight"], tensors[f"{name}.bias"] = weight, bias
-    header, data = {}, b""
-    for name, tensor in sorted(tensors.items()):
-        own = tensor.detach().numpy().astype(np.float16).tobytes()
-        header[name] = {"dtype": "F16", "shape": list(tensor.shape), "data_offsets": [len(data), len(data) + len(own)]}
-        data += own
-    text = json.dumps(header, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 8)
-    path.write_bytes(struct.pack("<Q", len(text)) + text + data)
-
-
-def read(path):
-    """The network of written weights: its normalisation does nothing."""
-    data = path.read_bytes()
-    begin = 8 + struct.unpack("<Q", data[:8])[0]
-    tensors = {}
-    for name, entry in json.loads(data[8:begin]).items():
-        first, last = (begin + offset for offset in entry["data_offsets"])
-        numbers = np.frombuffer(data[first:last], np.float16).reshape(entry["shape"])
-        tensors[name] = torch.from_numpy(numbers.astype(np.float32))
-    network = Network()
-    with torch.no_grad():
-        for name, convolution, normal in convolutions(network):
-            convolution.weight.copy_(tensors[f"{name}.weight"])
-            (normal or convolution).bias.copy_(tensors[f"{name}.bias"])
-            if normal:
-                nn.init.ones_(normal.weight)
-    return network
+    overlap = lambda network: turns.mean(overlaps(network, validation))
+    network, mean = (unet.Network(PLANES, CLASSES) for _ in range(2))
+    unet.fit(network, mean, batches(arguments.data / "train", np.random.default_rng(0)), loss, overlap, arguments)
 
 
 def parity(arguments):
     """Logits of a pattern that moves, for the test of src/grabcut/src/turn/network/mod.rs."""
-    network = read(arguments.weights)
+    network = unet.read(unet.Network(PLANES, CLASSES), arguments.weights)
     down, across = np.mgrid[0:72, 0:96]
     level = lambda turn, channel: (3 * across + down * (5 + channel) + turn * (across // 8 + 1) * (11 + channel) + across * down // 7) % 256
     frames = np.stack([np.stack([level(turn, channel) for channel in (2, 1, 0)], -1) for turn in range(8)]).astype(np.uint8)
     planes = np.zeros((1, PLANES, 96, 96), np.float32)
     planes[0, :, :72] = observed(frames)
     with torch.no_grad():
-        logits = network.eval()(torch.from_numpy(planes))[0].numpy()
+        logits = network(torch.from_numpy(planes))[0].numpy()
     for what, found in (("plane", planes[0]), ("logit", logits)):
         for number, plane in enumerate(found):
             print(what, number, *(f"{plane[y, x]:.5f}" for x, y in ((7, 5), (50, 33), (95, 71))))
@@ -505,11 +348,7 @@ def main():
     making.add_argument("--seed", type=int, default=0)
     making.set_defaults(run=make)
     training = verbs.add_parser("train")
-    training.add_argument("data", type=pathlib.Path)
-    training.add_argument("--minutes", type=float, default=60)
-    training.add_argument("--learning-rate", type=float, default=3e-3)
-    training.add_argument("--from", dest="begin", type=pathlib.Path, help="a checkpoint (.pt) to begin with")
-    training.add_argument("-o", "--output", type=pathlib.Path, required=True)
+    unet.add_training(training)
     training.set_defaults(run=train)
     comparing = verbs.add_parser("parity")
     comparing.add_argument("weights", type=pathlib.Path)
