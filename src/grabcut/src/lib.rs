@@ -61,6 +61,7 @@ mod preview;
 mod segment;
 mod settings;
 mod turn;
+mod unet;
 mod warning;
 
 pub use check::fit::{DoubtfulRegion, MaskCheck, ShapeCheck};

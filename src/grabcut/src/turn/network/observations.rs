@@ -16,8 +16,8 @@
 
 use image::RgbImage;
 
-use super::layers::Planes;
 use crate::turn::smooth::smooth;
+use crate::unet::Planes;
 
 /// How many planes there are.
 pub(super) const PLANES: usize = 20;

@@ -1,6 +1,7 @@
 //! The layers of a convolutional network, on the processor: planes of numbers, convolutions of 3 x 3, alone or
 //! in residual blocks, and changes of size by two.
 
+#[cfg(not(target_family = "wasm"))]
 use pulp::Arch;
 
 /// So many output channels and columns are computed together.
@@ -11,15 +12,15 @@ const KERNEL: usize = 3;
 
 /// Planes of numbers of one size, one after another.
 #[derive(Debug, Clone)]
-pub(super) struct Planes {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) values: Vec<f32>,
+pub(crate) struct Planes {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) values: Vec<f32>,
 }
 
 impl Planes {
     /// Planes full of zeros.
-    pub(super) fn zeros(channels: usize, (width, height): (usize, usize)) -> Self {
+    pub(crate) fn zeros(channels: usize, (width, height): (usize, usize)) -> Self {
         Self {
             width,
             height,
@@ -27,11 +28,11 @@ impl Planes {
         }
     }
 
-    pub(super) fn channels(&self) -> usize {
+    pub(crate) fn channels(&self) -> usize {
         self.values.len() / self.area().max(1)
     }
 
-    pub(super) fn area(&self) -> usize {
+    pub(crate) fn area(&self) -> usize {
         self.width * self.height
     }
 
@@ -124,6 +125,10 @@ impl Convolution {
     pub(super) fn apply(&self, planes: &Planes) -> Planes {
         let mut result = Planes::zeros(self.biases.len(), (planes.width, planes.height));
         let padded = planes.padded();
+        // `Arch` would add a version for relaxed SIMD, which not every browser has.
+        #[cfg(target_family = "wasm")]
+        self.fill(&padded, &mut result);
+        #[cfg(not(target_family = "wasm"))]
         Arch::new().dispatch(|| self.fill(&padded, &mut result));
         result
     }
