@@ -422,10 +422,10 @@ def room_light(path, is_white, rng):
     return np.roll(light, rng.integers(light.shape[1]), 1)
 
 
-def pictures(view, kind, path, many, rng):
+def pictures(view, kind, path, many, rng, paint_of=None):
     """The frames of a turn, one after another, and each row by row 8 bits of blue, green and red."""
     width, height = view.size
-    paint = Paint(kind, view, rng)
+    paint = (paint_of or Paint)(kind, view, rng)
     is_white = kind == "white-room" or kind is None and rng.random() < 0.22
     light = room_light(path, is_white, rng)
     soft = np.tile(cv2.resize(light, (192, 96), interpolation=cv2.INTER_AREA), (1, 3, 1))

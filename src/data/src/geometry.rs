@@ -46,6 +46,17 @@ impl Rect {
         i64::from(self.y) + i64::from(self.h)
     }
 
+    /// With as many pixels more on each side.
+    #[must_use]
+    pub fn grown(self, by: u32) -> Self {
+        Self::new(
+            self.x.saturating_sub_unsigned(by),
+            self.y.saturating_sub_unsigned(by),
+            self.w.saturating_add(by.saturating_mul(2)),
+            self.h.saturating_add(by.saturating_mul(2)),
+        )
+    }
+
     /// Whether a pixel is inside, by its number in row order of an image of this width.
     pub fn contains(self, pixel: usize, width: u32) -> bool {
         let (x, y) = (

@@ -36,13 +36,12 @@
 //!
 //! # How it decides
 //!
-//! With a rectangle, pixels outside are background; seeds overrule that. Cuts from several starts are compared at a
-//! small size, among them one in which the half of the rectangle that looks most like what is around it starts as
-//! background. The one of the lowest energy counts. With seeds alone, the colours of the marked pixels decide first,
-//! and what is connected with them; if no background is marked, unmarked pixels start as probable background. Colour
-//! models of both sides and minimum cuts take turns, and at each larger size a band along the edge is decided again.
+//! With a rectangle, pixels outside are background; seeds overrule that. A small network says which object the hints
+//! mean. The cut begins with its answer, which is evidence, too. With seeds alone, the colours of the marked pixels decide
+//! first, and what is connected with them. Colour models of both sides and minimum cuts take turns, and at each larger
+//! size a band along the edge is decided again.
 //!
-//! With a turn, a small network says which pixels show object, table or room. A pixel's colour is its average over the
+//! With a turn, another network says which pixels show object, table or room. A pixel's colour is its average over the
 //! frames, how much it changes counts too, and neighbours that change together belong together.
 //!
 //! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
@@ -50,10 +49,12 @@
 
 mod beyond;
 mod bitmap;
+mod by_hints;
 mod check;
 mod cleanup;
 mod cut;
 mod error;
+mod expected_overlap;
 mod hints;
 mod outline;
 mod plain;

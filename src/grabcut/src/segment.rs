@@ -6,16 +6,15 @@ use serde::{Deserialize, Serialize};
 
 use super::beyond;
 use super::bitmap::{Bitmap, Component, Connectivity};
-use super::cut::energy::CutEnergy;
-use super::cut::grab_cut::Label;
-use super::cut::pyramid::{CoarseCut, InitialModels, Pyramid};
+use super::by_hints;
+use super::cut::pyramid::Pyramid;
 use super::hints::trimap::Trimap;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
 use super::turn::statistics::TurnStatistics;
 use super::warning::{
-    IMPLAUSIBLE, NOTHING_MOVES, OPENING, UNCLEAR_TURN, cut_off, filled, hole_filled, turn_dropped,
-    warnings,
+    NOTHING_MOVES, OPENING, UNCLEAR_PICTURE, UNCLEAR_TURN, cut_off, filled, hole_filled,
+    turn_dropped, warnings,
 };
 use super::{Effort, Hints, Mark, MaskError, SegmentSettings, cleanup};
 
@@ -27,21 +26,10 @@ const FILLED_OF_TURN: f64 = 0.001;
 const MIN_OF_HINTS: f32 = 0.85;
 /// A turn's mask gets a warning if its expected overlap with the object is smaller.
 const UNSURE: f32 = 0.88;
-/// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
-const REACHES: f64 = 0.04;
-/// By how much a cut has to be better than that of GrabCut's own start where that reaches all sides of the rectangle, in
-/// units of the log-likelihood of a pixel.
-const MARGIN: f64 = 0.2;
-/// What is near a rectangle is within this share of its longer side.
+/// A mask by hints gets a warning if its expected overlap is smaller.
+const UNSURE_BY_HINTS: f32 = 0.6;
+/// Models learn from what is around a rectangle within this share of its longer side.
 const NEAR: f64 = 0.8;
-/// And what is very near within this.
-const VERY_NEAR: f64 = 0.2;
-/// An object covers at least this share of its rectangle.
-const LEAST_OF_RECT: f64 = 0.18;
-/// And what is kept of a cut is at least this share of it: a cut in many small pieces is none.
-const LEAST_KEPT: f64 = 0.6;
-/// Of what else is tried, the share of the rectangle that is background at first.
-const OTHER_SHARE: f64 = 0.25;
 /// A narrower change by marks is one of the edge, pixels to each side.
 const NARROW: usize = 1;
 
@@ -261,143 +249,30 @@ fn by_hints(
         rect,
     } = initial(hints, size)?;
     let pyramid = Pyramid::new(frame, labels)?;
-    let (mut cut, is_plausible) = match rect {
-        Some(rect) => best_cut(&pyramid, rect, first, settings)?,
-        None => (
-            pyramid.cut(pyramid.coarsest().labels.clone(), first, None)?,
-            true,
-        ),
-    };
+    let odds = by_hints::odds(&pyramid, rect);
+    let start = by_hints::start(&pyramid.coarsest().labels, first, &odds);
+    let pyramid = pyramid.with_evidence(by_hints::evidence(&odds));
+    let near = rect.map(surroundings);
+    let mut cut = pyramid.cut(start, first, near)?;
+    let overlap = by_hints::expected_overlap(&cut.object, &pyramid.coarsest().labels, &odds);
     let mut goes_on = None;
-    if let Some(rect) = rect.filter(|_| hints.seeds.is_none())
-        && let Some((longer, sides)) =
-            beyond::continued(&pyramid, &cut, rect, surroundings(rect, NEAR))
+    if let (Some(rect), Some(near), None) = (rect, near, &hints.seeds)
+        && let Some((longer, sides)) = beyond::continued(&pyramid, &cut, rect, near)
     {
         (cut, goes_on) = (longer, Some(sides));
     }
     let raw = pyramid.refined(cut, effort);
     let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME);
-    if !is_plausible {
-        mask.warnings.push(IMPLAUSIBLE.to_owned());
+    if overlap < UNSURE_BY_HINTS {
+        mask.warnings.push(UNCLEAR_PICTURE.to_owned());
     }
     mask.warnings.extend(goes_on.map(|sides| cut_off(&sides)));
     Ok(mask)
 }
 
-/// A coarse cut, and how it is judged.
-struct Candidate {
-    cut: CoarseCut,
-    /// The lower, the better.
-    energy: f64,
-    /// Whether it is an object by its size and its pieces.
-    is_plausible: bool,
-}
-
-/// The best of the coarse cuts in a rectangle, and whether the usual starts found an object.
-///
-/// There are three: GrabCut's own with all of the rectangle as object, twice, and one with the share of it as background
-/// that looks most like what is around it. Models learn from what is near the rectangle, in one of the first two only
-/// from what is very near: that shows best what is in the rectangle, but least of all colours.
-///
-/// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
-/// rectangle and is in places like what is around it. So the cut of the lowest energy counts. Where one of GrabCut's
-/// own start reaches all four sides of its rectangle, as the object of a tight one does, others have to be better by
-/// a margin. A cut whose size or pieces are not those of an object has a low energy too, because it says little: then
-/// two more starts are tried.
-fn best_cut(
-    pyramid: &Pyramid<'_>,
-    rect: Rect,
-    ranked: InitialModels,
-    settings: &SegmentSettings,
-) -> Result<(CoarseCut, bool), MaskError> {
-    let coarsest = pyramid.coarsest();
-    let part = pyramid.shrunk(rect);
-    let energy = CutEnergy::new(&coarsest.image, part);
-    let cut = |labels: Vec<Label>, first: InitialModels, near: f64| {
-        let cut = pyramid.cut(labels, first, Some(surroundings(rect, near)))?;
-        let cleaned = cleanup::clean(&cut.object, &[], settings.keep_all, FILLED_OF_FRAME);
-        let margin = if first == InitialModels::All && fills(cleaned.mask.bounds(), part) {
-            MARGIN
-        } else {
-            0.0
-        };
-        Ok(Candidate {
-            energy: energy.of(&cleaned.mask) - margin,
-            is_plausible: is_plausible(&cut.object, &cleaned.mask, part),
-            cut,
-        })
-    };
-    let all = InitialModels::All;
-    let usual = [(all, VERY_NEAR), (all, NEAR), (ranked, NEAR)];
-    let (mut cuts, mut failed) = (Vec::new(), None);
-    for (first, near) in usual {
-        match cut(coarsest.labels.clone(), first, near) {
-            Ok(found) => cuts.push(found),
-            Err(error) => failed = failed.or(Some(error)),
-        }
-    }
-    cuts.sort_by(|a, b| a.energy.total_cmp(&b.energy));
-    let is_usual = cuts.first().is_none_or(|best| best.is_plausible);
-    if !is_usual {
-        let middle = in_ellipse(&coarsest.labels, part, coarsest.image.width());
-        let other = InitialModels::Ranked(OTHER_SHARE);
-        let more = [
-            cut(coarsest.labels.clone(), other, NEAR),
-            cut(middle, all, NEAR),
-        ];
-        cuts.extend(more.into_iter().flatten());
-        cuts.sort_by(|a, b| {
-            let plausible = b.is_plausible.cmp(&a.is_plausible);
-            plausible.then(a.energy.total_cmp(&b.energy))
-        });
-    }
-    let best = cuts.into_iter().next();
-    let best = best.ok_or(failed.unwrap_or(MaskError::Empty))?;
-    Ok((best.cut, is_usual))
-}
-
-/// A rectangle with what is around it within a share of its longer side.
-fn surroundings(rect: Rect, share: f64) -> Rect {
-    let around = (f64::from(rect.w.max(rect.h)) * share) as u32;
-    Rect::new(
-        rect.x.saturating_sub_unsigned(around),
-        rect.y.saturating_sub_unsigned(around),
-        rect.w.saturating_add(2 * around),
-        rect.h.saturating_add(2 * around),
-    )
-}
-
-/// Whether what was kept of a cut is an object by its size and its pieces.
-fn is_plausible(cut: &Bitmap, kept: &Bitmap, rect: Rect) -> bool {
-    let area = f64::from(rect.w) * f64::from(rect.h);
-    let kept = kept.count() as f64;
-    kept >= LEAST_OF_RECT * area && kept >= LEAST_KEPT * cut.count() as f64
-}
-
-/// The labels with the corners of a rectangle, outside its inscribed ellipse, as background at first.
-fn in_ellipse(labels: &[Label], rect: Rect, width: u32) -> Vec<Label> {
-    let from_middle = |at: u32, begin: i32, length: u32| {
-        2.0 * (f64::from(at) + 0.5 - f64::from(begin)) / f64::from(length) - 1.0
-    };
-    let pixels = labels.iter().enumerate();
-    let labels = pixels.map(|(at, &label)| {
-        let (x, y) = (at as u32 % width, at as u32 / width);
-        let far = from_middle(x, rect.x, rect.w).hypot(from_middle(y, rect.y, rect.h));
-        match label {
-            Label::ProbablyObject if far > 1.0 => Label::ProbablyBackground,
-            other => other,
-        }
-    });
-    labels.collect()
-}
-
-/// Whether a cut reaches all four sides of its rectangle.
-fn fills(found: Rect, rect: Rect) -> bool {
-    let (across, down) = (f64::from(rect.w) * REACHES, f64::from(rect.h) * REACHES);
-    f64::from(found.x) - f64::from(rect.x) <= across
-        && f64::from(found.y) - f64::from(rect.y) <= down
-        && (rect.right() - found.right()) as f64 <= across
-        && (rect.bottom() - found.bottom()) as f64 <= down
+/// A rectangle with what is near it.
+fn surroundings(rect: Rect) -> Rect {
+    rect.grown((f64::from(rect.w.max(rect.h)) * NEAR) as u32)
 }
 
 /// Why the turn's mask is worse than that of the hints alone; none if it is not.
@@ -450,14 +325,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cut_reaches_a_rectangle_or_not() {
-        let rect = Rect::new(10, 10, 100, 50);
-        assert!(fills(Rect::new(12, 11, 96, 48), rect));
-        assert!(!fills(Rect::new(18, 11, 90, 48), rect));
-        assert!(!fills(Rect::new(12, 11, 96, 40), rect));
-    }
-
-    #[test]
     fn what_is_far_from_the_rectangle_may_have_the_colour_of_the_object() {
         let inside = |x: u32, y: u32| (30..60).contains(&x) && (30..60).contains(&y);
         let frame = RgbImage::from_fn(300, 90, |x, y| {
@@ -471,41 +338,6 @@ mod tests {
         let hints = Hints::from(Rect::new(20, 20, 50, 50));
         let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
         assert_eq!(mask.statistics.bounding_box, Rect::new(30, 30, 30, 30));
-    }
-
-    #[test]
-    fn a_start_from_the_middle_leaves_the_corners_out_and_keeps_what_is_sure() {
-        let mut labels = vec![Label::ProbablyObject; 100];
-        labels[0] = Label::Object;
-        let found = in_ellipse(&labels, Rect::new(0, 0, 10, 10), 10);
-        assert_eq!(found[0], Label::Object);
-        assert_eq!(found[9], Label::ProbablyBackground);
-        assert_eq!([found[44], found[4]], [Label::ProbablyObject; 2]);
-    }
-
-    #[test]
-    fn a_cut_that_covers_little_of_its_rectangle_or_is_in_pieces_is_not_plausible() {
-        let rect = Rect::new(0, 0, 10, 10);
-        let plausible = |rows: [&str; 10]| {
-            let cut = Bitmap::drawn(&rows);
-            let cleaned = cleanup::clean(&cut, &[], false, 0.0);
-            is_plausible(&cut, &cleaned.mask, rect)
-        };
-        let whole = "..######..";
-        assert!(plausible([whole; 10]));
-        let little = [whole, whole, "", "", "", "", "", "", "", ""];
-        assert!(!plausible(little.map(|row| if row.is_empty() {
-            ".........."
-        } else {
-            row
-        })));
-        let (none, pieces) = ("..........", "#.#.#.#.#.");
-        assert!(plausible([
-            whole, whole, whole, none, none, none, none, none, none, none
-        ]));
-        assert!(!plausible([
-            whole, whole, whole, none, pieces, none, pieces, none, pieces, none
-        ]));
     }
 
     #[test]

@@ -23,8 +23,8 @@ pub(super) const NOTHING_MOVES: &str = "hardly anything changes over the video: 
 /// Little overlap with the object is to be expected of a mask by the turn.
 pub(super) const UNCLEAR_TURN: &str = "the turn does not show clearly what is object: check the mask, and mark object and background in --edit or in seeds";
 
-/// The size or the pieces of a cut were not those of an object.
-pub(super) const IMPLAUSIBLE: &str = "object and background look alike, so that several cuts were tried: check the mask, and mark object and background in seeds";
+/// Little overlap with the object is to be expected of a mask by hints.
+pub(super) const UNCLEAR_PICTURE: &str = "the picture does not show clearly what is object: check the mask, and mark object and background in seeds";
 
 /// What the turn shows was not used; the hints alone decided.
 pub(super) fn turn_dropped(why: &str) -> String {

@@ -1,6 +1,5 @@
 //! GrabCut: colour models of both sides and minimum cuts take turns, coarse to fine.
 
-pub(crate) mod energy;
 mod geodesic;
 pub(crate) mod gmm;
 pub(crate) mod grab_cut;

@@ -27,9 +27,6 @@ const MIN_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
 /// Where the first colour models come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum InitialModels {
-    /// From all pixels, after the given share of the probable object that is most like the sure
-    /// background was set to probably background.
-    Ranked(f64),
     /// From the sure pixels alone, with what is connected with them as evidence.
     Sure,
     /// From all pixels.
@@ -73,6 +70,9 @@ pub(crate) struct Pyramid<'a> {
     /// From fine to coarse.
     finer: Vec<Level<'a>>,
     table: LabTable,
+    /// What else makes a pixel of the coarsest size object (positive) or background, in units of the log-likelihood;
+    /// empty where that is nothing.
+    evidence: Vec<f32>,
 }
 
 /// A cut at the coarsest size.
@@ -90,12 +90,48 @@ impl<'a> Pyramid<'a> {
             coarsest: finer.pop().ok_or(MaskError::Empty)?,
             finer,
             table: LabTable::new(),
+            evidence: Vec::new(),
         })
+    }
+
+    /// With evidence for each pixel of the coarsest size.
+    pub(crate) fn with_evidence(self, evidence: Vec<f32>) -> Self {
+        Self { evidence, ..self }
+    }
+
+    /// The image at the smallest of its sizes at which this holds of a part's width and height, else at its own, and how
+    /// often it was halved.
+    pub(crate) fn smallest(
+        &self,
+        part: Rect,
+        is_enough: impl Fn(Rect) -> bool,
+    ) -> (&Level<'a>, usize) {
+        let coarsest = (&self.coarsest, self.finer.len());
+        let finer = self.finer.iter().enumerate().rev();
+        let levels =
+            std::iter::once(coarsest).chain(finer.map(|(halvings, level)| (level, halvings)));
+        let mut found = coarsest;
+        for (level, halvings) in levels {
+            found = (level, halvings);
+            if is_enough(shrunk(part, halvings)) {
+                break;
+            }
+        }
+        found
     }
 
     /// The image at its coarsest size, with what is known at it.
     pub(crate) fn coarsest(&self) -> &Level<'a> {
         &self.coarsest
+    }
+
+    /// The width and height of the image.
+    pub(crate) fn size(&self) -> (u32, u32) {
+        self.finer
+            .first()
+            .unwrap_or(&self.coarsest)
+            .image
+            .dimensions()
     }
 
     /// A part of the image in the pixels of the coarsest size.
@@ -113,8 +149,10 @@ impl<'a> Pyramid<'a> {
     ) -> Result<CoarseCut, MaskError> {
         let mut field = RgbField::converted(&self.coarsest.image, &self.table);
         field.sampled = sampled.map(|part| self.shrunk(part));
+        field.evidence.clone_from(&self.evidence);
         if first == InitialModels::Sure {
-            field.evidence = geodesic::evidence(&field, &labels);
+            let nearness = geodesic::evidence(&field, &labels);
+            add(&mut field.evidence, nearness);
         }
         let models = begin_smooth(&field, &mut labels, first)?;
         Ok(CoarseCut {
@@ -161,8 +199,19 @@ impl<'a> Pyramid<'a> {
     }
 }
 
+/// Adds more evidence, of which each may be empty.
+fn add(evidence: &mut Vec<f32>, more: Vec<f32>) {
+    if evidence.is_empty() {
+        *evidence = more;
+    } else {
+        for (sum, more) in evidence.iter_mut().zip(more) {
+            *sum += more;
+        }
+    }
+}
+
 /// A part of an image in the pixels of the image that was halved so often.
-fn shrunk(part: Rect, halvings: usize) -> Rect {
+pub(crate) fn shrunk(part: Rect, halvings: usize) -> Rect {
     let end = |end: i64| ((end - 1) >> halvings) + 1;
     let (x, y) = (part.x >> halvings, part.y >> halvings);
     let side = |begin: i32, last: i64| (end(last) - i64::from(begin)) as u32;
@@ -226,10 +275,6 @@ pub(crate) fn start<const D: usize>(
     smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let models = match first {
-        InitialModels::Ranked(share) => {
-            grab_cut::rank(field, labels, share, |_| false);
-            None
-        }
         InitialModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
         InitialModels::All => None,
     };

@@ -6,14 +6,11 @@ use crate::cut::grab_cut::Label;
 use crate::cut::pyramid::InitialModels;
 use crate::{Hints, Mark, MaskError};
 
-/// Share of a rectangle that is background in a ranked start: a person leaves about half free.
-const SHARE_OF_RECT: f64 = 0.5;
-
 /// The labels with which cuts start.
 #[derive(Debug)]
 pub(crate) struct Trimap {
     pub(crate) labels: Vec<Label>,
-    /// The models of the only start; with a rectangle, of the ranked one.
+    /// From what the first models learn.
     pub(crate) first: InitialModels,
     /// The part of the hinted rectangle that is inside the frame.
     pub(crate) rect: Option<Rect>,
@@ -40,9 +37,8 @@ impl Trimap {
         };
         let pixels = size.0 as usize * size.1 as usize;
         let first = match rect {
-            Some(_) => InitialModels::Ranked(SHARE_OF_RECT),
             None if marks.contains(&Mark::Background) => InitialModels::Sure,
-            None => InitialModels::All,
+            _ => InitialModels::All,
         };
         let initial = Self {
             labels: (0..pixels).map(label).collect(),

@@ -21,6 +21,7 @@ use crate::cut::grab_cut::{
 };
 use crate::cut::lab::LabTable;
 use crate::cut::pyramid::{InitialModels, RgbField, ascend, half_image, levels, start};
+use crate::expected_overlap::expected_overlap;
 use crate::hints::trimap::Trimap;
 use crate::{Effort, Hints};
 
@@ -34,8 +35,9 @@ const MAX_PIXELS: usize = 600_000;
 const BORDER: f64 = 0.01;
 /// Share of the frame's shorter side from which the background is learned at first.
 const RING: f64 = 0.06;
-/// Share of the pixels within the ring that is taken for background at first.
+/// Share of the pixels within the ring that is taken for background at first, and of those in a rectangle.
 const SHARE: f64 = 0.7;
+const SHARE_OF_RECT: f64 = 0.5;
 /// Weight of what the network says, in units of the log-likelihood.
 const NETWORK_WEIGHT: f32 = 1.3;
 /// Weight of the average colour against that of the current one.
@@ -159,19 +161,9 @@ impl TurnStatistics {
     /// probabilities are right, and the mask where it is sure.
     pub(crate) fn expected_overlap(&self, mask: &Bitmap, sure: &Bitmap) -> f32 {
         let (mask, sure) = (self.downscaled(mask), self.downscaled(sure));
-        let (mut both, mut either) = (0.0, 0.0);
         let pixels = mask.bits().iter().zip(sure.bits());
-        for ((&inside, &is_sure), odds) in pixels.zip(&self.field.object_odds) {
-            let inside = f32::from(u8::from(inside));
-            let probability = if is_sure {
-                inside
-            } else {
-                1.0 / (1.0 + (-odds).exp())
-            };
-            both += inside * probability;
-            either += inside.max(probability);
-        }
-        both / either.max(1.0)
+        let pixels = pixels.zip(&self.field.object_odds);
+        expected_overlap(pixels.map(|((&mask, &sure), &odds)| (mask, sure, odds)))
     }
 
     /// Whether anything moves: a quarter of the pixels changes its brightness.
@@ -514,10 +506,7 @@ fn known(hints: &Hints, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError
         Label::ProbablyBackground => open(at),
         other => other,
     });
-    let share = match initial.first {
-        InitialModels::Ranked(share) => share,
-        _ => SHARE,
-    };
+    let share = initial.rect.map_or(SHARE, |_| SHARE_OF_RECT);
     Ok((labels.collect(), share))
 }
 
