@@ -17,7 +17,7 @@ import tempfile
 import cv2
 import numpy as np
 
-WORSE_BY = 2.0
+WORSE_BY = 5.0
 
 
 def made_box(truth, kind):

@@ -6,7 +6,7 @@
 
 With the packages of requirements-network.txt. `make` renders scenes, objects on a disc in a room, by turns.py; DATA/scenes
 gets one file a picture, colours and the object's coverage, and DATA/rooms the panoramas. `train` composes what it learns
-from: a third are scenes, the others objects of scenes and samples on backgrounds that are panoramas, scenes, or drawn.
+from: three in ten are scenes, the others objects of scenes and samples on backgrounds that are panoramas, scenes, or drawn.
 """
 
 import argparse
@@ -21,7 +21,9 @@ from torch.nn import functional
 import turns
 import unet
 
-SCENE, SHOTS = (320, 240), 4
+cv2.setNumThreads(1)
+
+SCENE, SHOTS, LIGHTINGS = (320, 240), 4, 2
 # As src/grabcut/src/by_hints/odds.rs describes them.
 SIDE, PLANES, AROUND = 192, 9, 0.3
 COARSE, FINE, RARE, MAX_RATIO = 3, 4, 1e-4, 5
@@ -29,7 +31,7 @@ UNMARKED, OBJECT, BACKGROUND = range(3)
 HINTS = {"tight": 0.25, "loose": 0.26, "cut": 0.14, "strokes": 0.2, "both": 0.07, "dense": 0.08}
 BATCH, FRESH, KEPT = 8, 4, 4000
 # An object of fewer pixels is left out.
-LEAST = 60
+MIN_PIXELS = 60
 
 
 class BrightTable(turns.Paint):
@@ -76,18 +78,19 @@ def filled(picture, known, blur):
 
 
 def scaled(picture, size=None, factor=None):
-    shrinks = factor < 1 if factor else size[0] < picture.shape[1]
-    how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-    return np.clip(cv2.resize(np.ascontiguousarray(picture), size, fx=factor, fy=factor, interpolation=how), 0, 255)
+    size = size or tuple(max(1, round(factor * side)) for side in picture.shape[1::-1])
+    how = cv2.INTER_AREA if size[0] < picture.shape[1] else cv2.INTER_LINEAR
+    return cv2.resize(np.ascontiguousarray(picture), size, interpolation=how)
 
 
 class Sources:
     """Objects and backgrounds."""
 
-    def __init__(self, data, rng):
+    def __init__(self, data, held_out, rng):
         self.rng = rng
-        self.scenes = sorted((data / "scenes").glob("*.npy"))
-        self.samples = [path.parent for path in sorted((data / "samples").glob("*/sample.json"))]
+        part = lambda paths, each: [path for at, path in enumerate(sorted(paths)) if (at // each % 16 == 0) == held_out]
+        self.scenes = part((data / "scenes").glob("*.npy"), SHOTS)
+        self.samples = [path.parent for path in part((data / "samples").glob("*/sample.json"), LIGHTINGS)]
         self.rooms = [np.load(path) for path in sorted((data / "rooms").glob("*.npy"))]
         if not (self.scenes and self.samples and self.rooms):
             raise SystemExit(f"{data} holds no scenes, samples or rooms: make them first")
@@ -109,12 +112,14 @@ class Sources:
         else:
             picture, cover = self.scene()
         rows, columns = np.nonzero(cover > 0.5)
-        if len(rows) < LEAST:
+        if len(rows) < MIN_PIXELS:
             return self.cut_out()
         place = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
         picture, cover = picture[place].astype(np.float32) / 255, cover[place]
-        # Without the background it was before.
-        picture = filled(picture, cover > 0.97, 1.2)
+        solid = cover > 0.97
+        if solid.sum() >= MIN_PIXELS:
+            # Without the background it was before.
+            picture = filled(picture, solid, 1.2)
         if rng.random() < 0.5:
             picture, cover = picture[:, ::-1], cover[:, ::-1]
         if rng.random() < 0.08:
@@ -232,7 +237,7 @@ def composed(sources):
             picture = np.ascontiguousarray(picture[..., rng.permutation(3)])
     else:
         picture, truth = on_background(sources, SCENE if rng.random() < 0.7 else SCENE[::-1])
-    return (picture, truth) if (truth > 0.5).sum() >= LEAST else composed(sources)
+    return (picture, truth) if (truth > 0.5).sum() >= MIN_PIXELS else composed(sources)
 
 
 def on_background(sources, size):
@@ -248,7 +253,7 @@ def on_background(sources, size):
     picture, cover = sources.cut_out()
     wanted = rng.uniform(0.22, 0.8) * np.sqrt(size[0] * size[1] / (cover.shape[0] * cover.shape[1]))
     factor = min(wanted, 0.95 * size[1] / cover.shape[0], 0.95 * size[0] / cover.shape[1])
-    picture, cover = np.clip(scaled(picture, factor=factor), 0, 1), np.clip(scaled(cover, factor=factor), 0, 1)
+    picture, cover = scaled(picture, factor=factor), scaled(cover, factor=factor)
     high, wide = cover.shape
     if rng.random() < 0.12:
         # Cut off by the picture's border.
@@ -330,9 +335,16 @@ def hinted(truth, rng):
         deep, far = opened(inside, 2)
         if box is not None:
             far &= within(box, truth.shape)
-        for region, mark, most in ((far, BACKGROUND, 5), (deep if deep.any() else inside, OBJECT, 4)):
-            for _ in range(rng.integers(1, most)):
-                stroke(marks, region, mark, int(rng.integers(1, 6)), rng)
+        if box is None and rng.random() < 0.5:
+            frame = np.zeros(truth.shape, np.uint8)
+            margin = int(rng.uniform(2, 12))
+            cv2.rectangle(frame, (margin, margin), (width - margin, height - margin), 255, int(rng.integers(1, 5)))
+            marks[(frame > 0) & far] = BACKGROUND
+        else:
+            for _ in range(rng.integers(1, 5)):
+                stroke(marks, far, BACKGROUND, int(rng.integers(1, 6)), rng)
+        for _ in range(rng.integers(1, 4)):
+            stroke(marks, deep if deep.any() else inside, OBJECT, int(rng.integers(1, 5)), rng)
         if box is None and not (marks == OBJECT).any():
             return hinted(truth, rng)
     return box, marks
@@ -366,8 +378,8 @@ def observed(picture, box, marks):
     part = [0, 0, width, height]
     if box is not None:
         background |= ~within(box, marks.shape) & (marks != OBJECT)
-        around = AROUND * max(box[2] - box[0], box[3] - box[1])
-        part = clipped(np.array(box) + [-around, -around, around, around], width, height)
+        more = AROUND * max(box[2] - box[0], box[3] - box[1])
+        part = clipped(np.array(box) + [-more, -more, more, more], width, height)
     left, top, right, bottom = part
     factor = SIDE / max(right - left, bottom - top)
     size = max(1, round((right - left) * factor)), max(1, round((bottom - top) * factor))
@@ -394,8 +406,7 @@ def example(sources):
 
 def compose(data, seed, queue):
     """Fills a queue with examples, for ever."""
-    cv2.setNumThreads(1)
-    sources = Sources(data, np.random.default_rng(seed))
+    sources = Sources(data, False, np.random.default_rng(seed))
     while True:
         queue.put(example(sources))
 
@@ -415,7 +426,7 @@ def batches(queue, rng):
     """Batches of the last examples, each of which is used about twice."""
     kept = []
     while True:
-        kept = [*kept, *(queue.get() for _ in range(FRESH if kept else 200))][-KEPT:]
+        kept = [*kept, *(queue.get(timeout=300) for _ in range(FRESH if kept else 200))][-KEPT:]
         chosen = [varied(kept[at], rng) for at in rng.integers(0, len(kept), BATCH)]
         yield apart(np.stack(chosen))
 
@@ -442,13 +453,13 @@ def overlap(network, examples):
 
 
 def train(arguments):
-    sources = Sources(arguments.data, np.random.default_rng(1))
+    sources = Sources(arguments.data, True, np.random.default_rng(1))
     validation = [example(sources) for _ in range(100)]
     queue = multiprocessing.Queue(64)
     multiprocessing.Process(target=compose, args=(arguments.data, 7, queue), daemon=True).start()
     network, mean = (unet.Network(PLANES, 1) for _ in range(2))
-    told = lambda network: overlap(network, validation)
-    unet.fit(network, mean, batches(queue, np.random.default_rng(99)), loss, told, arguments)
+    overlap_of = lambda network: overlap(network, validation)
+    unet.fit(network, mean, batches(queue, np.random.default_rng(99)), loss, overlap_of, arguments)
 
 
 def parity(arguments):

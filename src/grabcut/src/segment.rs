@@ -144,7 +144,7 @@ fn cut_unclosed(
     effort: Effort,
 ) -> Result<Mask, MaskError> {
     let Some(turn) = turn else {
-        return by_hints(frame, hints, settings, effort);
+        return cut_by_hints(frame, hints, settings, effort);
     };
     let size = frame.dimensions();
     check_size(size)?;
@@ -156,13 +156,13 @@ fn cut_unclosed(
         Ok(by_turn) => by_turn,
         Err(error) if hints.is_empty() => return Err(error),
         Err(error) => {
-            let mask = by_hints(frame, hints, settings, effort)?;
+            let mask = cut_by_hints(frame, hints, settings, effort)?;
             return dropped(mask, &error.to_string());
         }
     };
     let rect = used_rect(hints, size);
     if rect.is_some()
-        && let Ok(other) = by_hints(frame, hints, settings, effort)
+        && let Ok(other) = cut_by_hints(frame, hints, settings, effort)
         && let Some(why) = misled(turn, &by_turn, &other)
     {
         return dropped(other, &why);
@@ -235,7 +235,7 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
 }
 
 /// The cut by hints alone.
-fn by_hints(
+fn cut_by_hints(
     frame: &RgbImage,
     hints: &Hints,
     settings: &SegmentSettings,
@@ -249,21 +249,31 @@ fn by_hints(
         rect,
     } = initial(hints, size)?;
     let pyramid = Pyramid::new(frame, labels)?;
+    let known = pyramid.coarsest().labels.clone();
     let odds = by_hints::odds(&pyramid, rect);
-    let start = by_hints::start(&pyramid.coarsest().labels, first, &odds);
-    let pyramid = pyramid.with_evidence(by_hints::evidence(&odds));
+    let start = by_hints::start(&known, first, &odds);
+    let mut pyramid = pyramid.with_evidence(by_hints::evidence(&odds));
     let near = rect.map(surroundings);
-    let mut cut = pyramid.cut(start, first, near)?;
-    let overlap = by_hints::expected_overlap(&cut.object, &pyramid.coarsest().labels, &odds);
+    let mut cut = match pyramid.cut(start, first, near) {
+        // Where the network finds nothing, or nothing else, the colours decide.
+        Err(MaskError::Empty | MaskError::Everything) if !odds.is_empty() => {
+            pyramid = pyramid.with_evidence(Vec::new());
+            pyramid.cut(known.clone(), first, near)
+        }
+        cut => cut,
+    }?;
     let mut goes_on = None;
     if let (Some(rect), Some(near), None) = (rect, near, &hints.seeds)
         && let Some((longer, sides)) = beyond::continued(&pyramid, &cut, rect, near)
     {
         (cut, goes_on) = (longer, Some(sides));
     }
+    let cleaned = cleanup::clean(&cut.object, &[], settings.keep_all, FILLED_OF_FRAME).mask;
+    let is_unclear =
+        !odds.is_empty() && by_hints::expected_overlap(&cleaned, &known, &odds) < UNSURE_BY_HINTS;
     let raw = pyramid.refined(cut, effort);
     let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME);
-    if overlap < UNSURE_BY_HINTS {
+    if is_unclear {
         mask.warnings.push(UNCLEAR_PICTURE.to_owned());
     }
     mask.warnings.extend(goes_on.map(|sides| cut_off(&sides)));

@@ -18,21 +18,19 @@ pub(crate) fn evidence(odds: &[f32]) -> Vec<f32> {
 /// The labels with which a cut starts: open pixels are what the network says, if it says that some are object and if the
 /// first models learn from them.
 pub(crate) fn start(known: &[Label], first: InitialModels, odds: &[f32]) -> Vec<Label> {
-    let pixels = known.iter().zip(odds);
-    let labels: Vec<Label> = pixels
-        .map(|(&label, &odds)| {
-            if label.is_sure() {
-                label
-            } else {
-                Label::probably(odds > 0.0)
-            }
-        })
-        .collect();
-    if first == InitialModels::All && labels.iter().any(|label| label.is_object()) {
-        labels
-    } else {
-        known.to_vec()
+    let pixels = || known.iter().zip(odds);
+    let is_found = pixels().any(|(label, &odds)| !label.is_sure() && odds > 0.0);
+    if first != InitialModels::All || !is_found {
+        return known.to_vec();
     }
+    let labels = pixels().map(|(&label, &odds)| {
+        if label.is_sure() {
+            label
+        } else {
+            Label::probably(odds > 0.0)
+        }
+    });
+    labels.collect()
 }
 
 /// The overlap with the object that is to be expected of a mask, all at the coarsest size.

@@ -12,8 +12,10 @@
 //! | 1 | how much more often it is seen in the sure object than elsewhere, of 8 levels |
 //! | 2 | the column and the row, -1..=1 |
 
+use std::ops::Range;
+
 use image::imageops::{FilterType, crop_imm, resize};
-use image::{GrayImage, Luma, Rgb, RgbImage};
+use image::{GrayImage, ImageBuffer, Luma, Pixel, Rgb, RgbImage};
 use relit_data::geometry::Rect;
 
 use crate::cut::grab_cut::Label;
@@ -27,8 +29,9 @@ const _: () = assert!(SIDE.is_multiple_of(1 << LEVELS));
 const AROUND: f64 = 0.3;
 /// How many planes there are.
 const PLANES: usize = 11;
-/// Bits of a channel that the histograms distinguish.
+/// Bits of a channel that the coarser histograms distinguish.
 const COARSE: u32 = 3;
+/// And the finer one.
 const FINE: u32 = 4;
 /// Added to the shares of a colour, so that one that is not seen is rare.
 const RARE: f32 = 1e-4;
@@ -38,7 +41,7 @@ const MAX_RATIO: f32 = 5.0;
 /// The weights of the layers.
 const WEIGHTS: &[u8] = include_bytes!("weights.safetensors");
 /// The logarithm of odds that are certain.
-const MAX_ODDS: f32 = 8.0;
+const MAX_LOG_ODDS: f32 = 8.0;
 
 /// The logarithms of the odds that a pixel shows the object.
 #[derive(Debug)]
@@ -51,21 +54,22 @@ struct Odds {
 }
 
 /// The logarithms of the odds that each pixel of the pyramid's coarsest size shows the object that is meant; certainly not,
-/// outside of what the network sees. Empty if there is no network.
+/// outside of what the network sees. Empty if no pixel is surely background: the network has not learned to do without.
 pub(crate) fn odds(pyramid: &Pyramid<'_>, rect: Option<Rect>) -> Vec<f32> {
-    let (coarsest, halvings) = pyramid.smallest(Rect::new(0, 0, 1, 1), |_| true);
-    let Some(network) = Network::read(WEIGHTS) else {
+    let coarsest = pyramid.coarsest();
+    if !coarsest.labels.contains(&Label::Background) {
         return Vec::new();
-    };
-    let whole = pyramid.size();
-    let part = part(whole, rect);
+    }
+    let part = part(pyramid.size(), rect);
     let (level, seen) = pyramid.smallest(part, |part| part.w.max(part.h) as usize >= SIDE);
     let (width, height) = level.image.dimensions();
-    let Some(part) = shrunk(part, seen).clipped_to(width, height) else {
-        return Vec::new();
-    };
-    let odds = Odds::new(&network, &level.image, &level.labels, part);
-    odds.at(coarsest.size(), halvings - seen)
+    let part = shrunk(part, seen).clipped_to(width, height);
+    let odds = part
+        .zip(Network::read(WEIGHTS))
+        .map(|(part, network)| Odds::new(&network, &level.image, &level.labels, part));
+    odds.map_or_else(Vec::new, |odds| {
+        odds.at(coarsest.size(), pyramid.halvings() - seen)
+    })
 }
 
 /// The part of a picture that the network sees.
@@ -93,11 +97,11 @@ impl Odds {
 
     /// For each pixel of the picture after it was halved so often.
     fn at(&self, (columns, rows): (usize, usize), halvings: usize) -> Vec<f32> {
-        let along = |count: usize, begin: i32, length: u32, to: usize| {
+        let shown = shrunk(self.part, halvings);
+        let along = |count: usize, begin: i32, length: u32, shown: Range<i64>, to: usize| {
             let place = |at: usize| {
-                let place = (at as f64 + 0.5) * f64::from(1_u32 << halvings) - f64::from(begin);
-                let is_inside = (0.0..f64::from(length)).contains(&place);
-                is_inside.then(|| {
+                shown.contains(&(at as i64)).then(|| {
+                    let place = (at as f64 + 0.5) * f64::from(1_u32 << halvings) - f64::from(begin);
                     let place = place * to as f64 / f64::from(length) - 0.5;
                     let place = place.clamp(0.0, (to - 1) as f64);
                     let low = place as usize;
@@ -106,8 +110,15 @@ impl Odds {
             };
             (0..count).map(place).collect::<Vec<_>>()
         };
-        let across = along(columns, self.part.x, self.part.w, self.size.0);
-        let down = along(rows, self.part.y, self.part.h, self.size.1);
+        let Rect { x, y, w, h } = self.part;
+        let across = along(
+            columns,
+            x,
+            w,
+            i64::from(shown.x)..shown.right(),
+            self.size.0,
+        );
+        let down = along(rows, y, h, i64::from(shown.y)..shown.bottom(), self.size.1);
         let mixed = |row: usize, (left, right, share): (usize, usize, f32)| {
             let row = &self.values[row * self.size.0..];
             row[left] + share * (row[right] - row[left])
@@ -119,8 +130,8 @@ impl Odds {
                 Some(above + share * (below - above))
             })
         });
-        let most = |odds: f32| odds.clamp(-MAX_ODDS, MAX_ODDS);
-        each.map(|odds| odds.map_or(-MAX_ODDS, most)).collect()
+        let most = |odds: f32| odds.clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
+        each.map(|odds| odds.map_or(-MAX_LOG_ODDS, most)).collect()
     }
 }
 
@@ -131,17 +142,67 @@ fn seen(image: &RgbImage, labels: &[Label], part: Rect) -> (Planes, (usize, usiz
     let (width, height) = (small(part.w), small(part.h));
     let (left, top) = (part.x as u32, part.y as u32);
     let rgb = crop_imm(image, left, top, part.w, part.h).to_image();
-    let rgb = resize(&rgb, width, height, FilterType::Triangle);
+    let rgb = resized(&rgb, (width, height));
     let sure = |wanted: Label| {
         let level = |x: u32, y: u32| {
             let at = (top + y) as usize * image.width() as usize + (left + x) as usize;
             Luma([u8::from(labels[at] == wanted) * 255])
         };
-        let marked = GrayImage::from_fn(part.w, part.h, level);
-        resize(&marked, width, height, FilterType::Triangle)
+        resized(&GrayImage::from_fn(part.w, part.h, level), (width, height))
     };
     let planes = observed(&rgb, &sure(Label::Object), &sure(Label::Background));
     (planes, (width as usize, height as usize))
+}
+
+/// An image at another size: a smaller pixel is the mean of the area that it covers, a larger one is interpolated.
+fn resized<P: Pixel<Subpixel = u8> + 'static>(
+    image: &ImageBuffer<P, Vec<u8>>,
+    (width, height): (u32, u32),
+) -> ImageBuffer<P, Vec<u8>> {
+    if width >= image.width() {
+        return resize(image, width, height, FilterType::Triangle);
+    }
+    let (across, down) = (
+        covered(image.width(), width),
+        covered(image.height(), height),
+    );
+    let mut small: ImageBuffer<P, Vec<u8>> = ImageBuffer::new(width, height);
+    for ((x, y), pixel) in (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .zip(small.pixels_mut())
+    {
+        let (columns, rows) = (&across[x as usize], &down[y as usize]);
+        let mut sums = [0.0_f32; 4];
+        for &(row, of_row) in rows {
+            for &(column, of_column) in columns {
+                let levels = image.get_pixel(column, row).channels();
+                for (sum, &level) in sums.iter_mut().zip(levels) {
+                    *sum += of_row * of_column * f32::from(level);
+                }
+            }
+        }
+        for (level, sum) in pixel.channels_mut().iter_mut().zip(sums) {
+            *level = sum.round() as u8;
+        }
+    }
+    small
+}
+
+/// For each of `to` pixels in a row the pixels of `from` that it covers, with their shares of it.
+fn covered(from: u32, to: u32) -> Vec<Vec<(u32, f32)>> {
+    let scale = f64::from(from) / f64::from(to);
+    let of = |at: u32| {
+        let (begin, end) = (f64::from(at) * scale, f64::from(at + 1) * scale);
+        let last = (end.ceil() as u32).min(from);
+        let share = |pixel: u32| {
+            let (left, right) = (f64::from(pixel), f64::from(pixel + 1));
+            ((right.min(end) - left.max(begin)) / scale) as f32
+        };
+        (begin as u32..last)
+            .map(|pixel| (pixel, share(pixel)))
+            .collect()
+    };
+    (0..to).map(of).collect()
 }
 
 /// The planes of a picture and of what is surely object and background in it.
@@ -201,7 +262,7 @@ impl Colours {
     /// The logarithms of how much more often each pixel's colour is seen in the first part than in the rest, -1..=1;
     /// zeros if either is empty.
     fn ratios(&self, is_first: impl Fn(usize) -> bool) -> Vec<f32> {
-        let mut counts = [0; 2].map(|_: i32| vec![0_u32; 1 << (3 * self.bits)]);
+        let mut counts: [_; 2] = std::array::from_fn(|_| vec![0_u32; 1 << (3 * self.bits)]);
         for (at, &colour) in self.of.iter().enumerate() {
             counts[usize::from(is_first(at))][colour] += 1;
         }
@@ -296,6 +357,20 @@ mod tests {
         let found = odds.at((8, 2), 1);
         let row = [-8.0, -8.0, -1.0, 0.0, 2.0, 3.0, -8.0, -8.0];
         assert_eq!(found, [row, row].concat());
+        // The last pixel of a side that was odd.
+        let odd = Odds {
+            part: Rect::new(2, 0, 3, 1),
+            size: (1, 1),
+            values: vec![2.0],
+        };
+        assert_eq!(odd.at((3, 1), 1), [-8.0, 2.0, 2.0]);
+    }
+
+    #[test]
+    fn a_smaller_pixel_is_the_mean_of_what_it_covers() {
+        let image = GrayImage::from_raw(3, 1, vec![0, 90, 255]).unwrap();
+        assert_eq!(resized(&image, (2, 1)).into_raw(), [30, 200]);
+        assert_eq!(resized(&image, (1, 1)).into_raw(), [115]);
     }
 
     #[test]

@@ -125,6 +125,11 @@ impl<'a> Pyramid<'a> {
         &self.coarsest
     }
 
+    /// How often the image was halved to the coarsest size.
+    pub(crate) fn halvings(&self) -> usize {
+        self.finer.len()
+    }
+
     /// The width and height of the image.
     pub(crate) fn size(&self) -> (u32, u32) {
         self.finer

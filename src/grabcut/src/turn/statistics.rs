@@ -35,8 +35,9 @@ const MAX_PIXELS: usize = 600_000;
 const BORDER: f64 = 0.01;
 /// Share of the frame's shorter side from which the background is learned at first.
 const RING: f64 = 0.06;
-/// Share of the pixels within the ring that is taken for background at first, and of those in a rectangle.
+/// Share of the pixels within the ring that is taken for background at first.
 const SHARE: f64 = 0.7;
+/// The same share of the pixels in a rectangle.
 const SHARE_OF_RECT: f64 = 0.5;
 /// Weight of what the network says, in units of the log-likelihood.
 const NETWORK_WEIGHT: f32 = 1.3;
