@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::beyond;
 use super::bitmap::{Bitmap, Component, Connectivity};
 use super::by_hints;
-use super::cut::pyramid::Pyramid;
+use super::cut::pyramid::{InitialModels, Pyramid};
 use super::hints::trimap::Trimap;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
@@ -30,6 +30,8 @@ const UNSURE: f32 = 0.88;
 const UNSURE_BY_HINTS: f32 = 0.6;
 /// Models learn from what is around a rectangle within this share of its longer side.
 const NEAR: f64 = 0.8;
+/// The share of a rectangle that is background: a person leaves about half free.
+const FREE_OF_RECT: f64 = 0.5;
 /// A narrower change by marks is one of the edge, pixels to each side.
 const NARROW: usize = 1;
 
@@ -167,7 +169,7 @@ fn cut_unclosed(
     {
         return dropped(other, &why);
     }
-    let mut mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN);
+    let mut mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN)?;
     if turn.expected_overlap(&Bitmap::from_mask(&mask.image), &sure(hints, size)?) < UNSURE {
         mask.warnings.push(UNCLEAR_TURN.to_owned());
     }
@@ -212,13 +214,8 @@ pub fn clean_cut(
 ) -> Result<Mask, MaskError> {
     let size = cut.dimensions();
     let raw = Bitmap::from_mask(cut);
-    match raw.count() {
-        0 => return Err(MaskError::Empty),
-        all if all == cut.as_raw().len() as u64 => return Err(MaskError::Everything),
-        _ => {}
-    }
     let rect = used_rect(hints, size);
-    Ok(finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME))
+    finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME)
 }
 
 /// The labels of a frame by hints alone, which have to say where the object may be.
@@ -255,9 +252,10 @@ fn cut_by_hints(
     let mut pyramid = pyramid.with_evidence(by_hints::evidence(&odds));
     let near = rect.map(surroundings);
     let mut cut = match pyramid.cut(start, first, near) {
-        // Where the network finds nothing, or nothing else, the colours decide.
-        Err(MaskError::Empty | MaskError::Everything) if !odds.is_empty() => {
+        // Where the network says nothing, or that there is nothing else, the colours decide.
+        Err(MaskError::Empty | MaskError::Everything) => {
             pyramid = pyramid.with_evidence(Vec::new());
+            let first = rect.map_or(first, |_| InitialModels::Ranked(FREE_OF_RECT));
             pyramid.cut(known.clone(), first, near)
         }
         cut => cut,
@@ -272,7 +270,7 @@ fn cut_by_hints(
     let is_unclear =
         !odds.is_empty() && by_hints::expected_overlap(&cleaned, &known, &odds) < UNSURE_BY_HINTS;
     let raw = pyramid.refined(cut, effort);
-    let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME);
+    let mut mask = finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME)?;
     if is_unclear {
         mask.warnings.push(UNCLEAR_PICTURE.to_owned());
     }
@@ -296,6 +294,7 @@ fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<St
     })
 }
 
+/// The mask of a cut, cleaned up, with its warnings.
 fn finish(
     raw: &Bitmap,
     size: (u32, u32),
@@ -303,11 +302,16 @@ fn finish(
     rect: Option<Rect>,
     settings: &SegmentSettings,
     fill_to: f64,
-) -> Mask {
+) -> Result<Mask, MaskError> {
+    match raw.count() {
+        0 => return Err(MaskError::Empty),
+        all if all == raw.bits().len() as u64 => return Err(MaskError::Everything),
+        _ => {}
+    }
     let cleaned = cleanup::clean(raw, hints.marks(), settings.keep_all, fill_to);
     let levels = cleaned.mask.bits().iter().map(|&bit| u8::from(bit) * 255);
     let area_px = cleaned.mask.count();
-    Mask {
+    Ok(Mask {
         image: GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default(),
         statistics: MaskStatistics {
             area_px,
@@ -318,7 +322,7 @@ fn finish(
         },
         names_hole: filled(&cleaned, area_px as f64).is_some(),
         warnings: warnings(hints, rect, &cleaned, size),
-    }
+    })
 }
 
 pub(crate) fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
@@ -348,6 +352,37 @@ mod tests {
         let hints = Hints::from(Rect::new(20, 20, 50, 50));
         let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
         assert_eq!(mask.statistics.bounding_box, Rect::new(30, 30, 30, 30));
+    }
+
+    #[test]
+    fn a_rectangle_that_leaves_hardly_any_background_is_cut_by_colours() {
+        let inside = |x: u32, y: u32| (x as f64 - 320.0).hypot(y as f64 - 240.0) < 150.0;
+        let frame = RgbImage::from_fn(640, 480, |x, y| {
+            let grain = ((x * 7 + y * 13) % 11) as u8;
+            image::Rgb(if inside(x, y) {
+                [190 + grain, 70, 40]
+            } else {
+                [40 + grain, 80, 90]
+            })
+        });
+        let hints = Hints::from(Rect::new(1, 1, 638, 478));
+        let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
+        let bounds = mask.statistics.bounding_box;
+        assert!(
+            (298..304).contains(&bounds.w) && (298..304).contains(&bounds.h),
+            "{bounds}"
+        );
+    }
+
+    #[test]
+    fn a_cut_of_nothing_or_of_everything_is_no_mask() {
+        let hints = Hints::from(Rect::new(4, 4, 8, 8));
+        let finished = |level: u8| {
+            let cut = GrayImage::from_pixel(16, 16, image::Luma([level]));
+            clean_cut(&cut, &hints, &SegmentSettings::default())
+        };
+        assert!(matches!(finished(0), Err(MaskError::Empty)));
+        assert!(matches!(finished(255), Err(MaskError::Everything)));
     }
 
     #[test]

@@ -83,7 +83,7 @@ fn part((width, height): (u32, u32), rect: Option<Rect>) -> Rect {
 }
 
 impl Odds {
-    /// Of a part of a picture of which `labels` say what is sure.
+    /// Of a part of a picture. `labels` say what is sure in the whole picture.
     fn new(network: &Network, image: &RgbImage, labels: &[Label], part: Rect) -> Self {
         let (seen, (width, height)) = seen(image, labels, part);
         let logits = network.apply(seen);
@@ -135,7 +135,7 @@ impl Odds {
     }
 }
 
-/// The planes of a part of a picture of which `labels` say what is sure, and its width and height in them.
+/// The planes of a part of a picture, and its width and height in them. `labels` say what is sure in the whole picture.
 fn seen(image: &RgbImage, labels: &[Label], part: Rect) -> (Planes, (usize, usize)) {
     let scale = SIDE as f64 / f64::from(part.w.max(part.h));
     let small = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);

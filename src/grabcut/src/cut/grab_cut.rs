@@ -192,7 +192,10 @@ pub(crate) fn iterate<const D: usize, F: Field<D>>(
             check_sides(labels)?;
             models
         }
-        None => Models::learn(field, labels, |_| true),
+        None => {
+            check_sides(labels)?;
+            Models::learn(field, labels, |_| true)
+        }
     };
     for round in 0..ITERATIONS {
         if round > 0 {

@@ -27,6 +27,9 @@ const MIN_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
 /// Where the first colour models come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum InitialModels {
+    /// From all pixels, after the given share of the probable object that is most like the sure
+    /// background was set to probably background.
+    Ranked(f64),
     /// From the sure pixels alone, with what is connected with them as evidence.
     Sure,
     /// From all pixels.
@@ -204,7 +207,7 @@ impl<'a> Pyramid<'a> {
     }
 }
 
-/// Adds more evidence, of which each may be empty.
+/// Adds more evidence. Both may be empty.
 fn add(evidence: &mut Vec<f32>, more: Vec<f32>) {
     if evidence.is_empty() {
         *evidence = more;
@@ -280,6 +283,17 @@ pub(crate) fn start<const D: usize>(
     smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let models = match first {
+        InitialModels::Ranked(share) => {
+            let (width, height) = field.size();
+            let is_border = |at: usize| {
+                let (x, y) = (at % width, at / width);
+                x == 0 || y == 0 || x + 1 == width || y + 1 == height
+            };
+            // A rectangle nearly as large as the image leaves no background at this size.
+            let is_filled = !labels.contains(&Label::Background);
+            grab_cut::rank(field, labels, share, |at| is_filled && is_border(at));
+            None
+        }
         InitialModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
         InitialModels::All => None,
     };
