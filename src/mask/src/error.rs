@@ -25,11 +25,16 @@ pub enum MaskingError {
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
     OutputName(PathBuf),
-    /// A mask that differs from its record, or has none.
+    /// A mask that differs from its record, or has none; or a preview without a record.
     #[error(
         "{0} was not made by this program, or was changed since: give --force to replace it, or another name with -o"
     )]
     Handmade(PathBuf),
+    /// What is to be written has the name of a file that the mask is made from.
+    #[error(
+        "{0} is an input, and would be overwritten: give another name, or a folder for masks, with -o"
+    )]
+    IsInput(PathBuf),
     /// The mask that is there is that of another recording.
     #[error(
         "{mask} was made of another input, whose file is called {input}: give another name with -o, or --force to replace it"
@@ -91,7 +96,7 @@ pub enum MaskingError {
 }
 
 impl MaskingError {
-    /// The mask that was made by hand, if that is why none was made.
+    /// The file that was made by hand, if that is why none was made.
     #[must_use]
     pub fn handmade(&self) -> Option<&Path> {
         match self {

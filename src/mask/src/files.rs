@@ -49,13 +49,32 @@ impl MaskFiles {
     }
 }
 
-/// Checks that existing files may be replaced.
-pub(super) fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), MaskingError> {
+/// Checks that existing files may be replaced. `inputs` may not, even by force.
+pub(super) fn check_replaceable<'a>(
+    files: &MaskFiles,
+    inputs: impl IntoIterator<Item = &'a Path>,
+    force: bool,
+) -> Result<(), MaskingError> {
+    let written = [&files.mask, &files.preview].map(|path| (path, fs::canonicalize(path).ok()));
+    for input in inputs
+        .into_iter()
+        .filter_map(|path| fs::canonicalize(path).ok())
+    {
+        if let Some((path, _)) = written
+            .iter()
+            .find(|(_, whole)| whole.as_ref() == Some(&input))
+        {
+            return Err(MaskingError::IsInput((*path).clone()));
+        }
+    }
     let record = read_record(&files.record)?;
     // It may be written, too, and another program's file of that name is never overwritten.
     read_record(&files.previous)?;
     if force {
         return Ok(());
+    }
+    if record.is_none() && files.preview.exists() {
+        return Err(MaskingError::Handmade(files.preview.clone()));
     }
     let Some(mask) = read_if_exists(&files.mask)? else {
         return Ok(());
@@ -123,10 +142,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::from_mask_path(&folder.path().join("session.png")).unwrap();
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
-        let result = check_replaceable(&files, true);
+        let result = check_replaceable(&files, [], true);
         assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
         fs::rename(&files.record, &files.previous).unwrap();
-        let result = check_replaceable(&files, true);
+        let result = check_replaceable(&files, [], true);
         assert!(matches!(
             result,
             Err(MaskingError::ForeignFile { path, .. }) if path == files.previous
@@ -157,12 +176,12 @@ mod tests {
     fn a_mask_without_record_is_replaced_only_with_force() {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::from_mask_path(&folder.path().join("mask.png")).unwrap();
-        assert!(check_replaceable(&files, false).is_ok());
+        assert!(check_replaceable(&files, [], false).is_ok());
         fs::write(&files.mask, "painted").unwrap();
         assert!(matches!(
-            check_replaceable(&files, false),
+            check_replaceable(&files, [], false),
             Err(MaskingError::Handmade(_))
         ));
-        assert!(check_replaceable(&files, true).is_ok());
+        assert!(check_replaceable(&files, [], true).is_ok());
     }
 }

@@ -14,8 +14,15 @@ use relit_data::still::is_named;
 use super::files::read_record;
 use super::{MaskFiles, MaskingError};
 
-/// What stands behind a mask's name in the names of the files that go with it.
-const COMPANIONS: [&str; 3] = ["-preview", "-previous", "-check"];
+/// What follows a mask's name in its file's and in those that go with it.
+const ENDINGS: [&str; 6] = [
+    ".png",
+    ".json",
+    "-preview.png",
+    "-previous.json",
+    "-check.html",
+    "-check.json",
+];
 
 /// Where masks are written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +43,7 @@ impl MaskTarget {
         let text = path.as_os_str().to_string_lossy();
         let ends_as_folder = text.ends_with(['/', MAIN_SEPARATOR]);
         let is_name = path.extension().is_none() && path.file_name().is_some();
-        if ends_as_folder || is_name || path.is_dir() {
+        if path.is_dir() || (ends_as_folder || is_name) && !path.is_file() {
             Ok(Self::Folder(path.to_owned()))
         } else {
             MaskFiles::from_mask_path(path).map(Self::File)
@@ -146,11 +153,11 @@ fn photographs(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), SessionErr
 
 /// Whether a file is a mask that this program made, or goes with one, by its record.
 fn is_of_mask(path: &Path) -> bool {
-    let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
-    let stems = COMPANIONS
-        .iter()
-        .filter_map(|ending| stem.strip_suffix(ending));
-    let mut stems = stems.chain([stem]);
+    let name = path.file_name().and_then(OsStr::to_str).unwrap_or_default();
+    let mut stems = ENDINGS.iter().filter_map(|ending| {
+        let (stem, end) = name.split_at_checked(name.len().checked_sub(ending.len())?)?;
+        end.eq_ignore_ascii_case(ending).then_some(stem)
+    });
     stems.any(|stem| {
         let record = path.with_file_name(format!("{stem}.json"));
         matches!(read_record(&record), Ok(Some(_)))

@@ -79,7 +79,7 @@ impl<'a> Prepared<'a> {
         let mut recording = Recording::open(input)?;
         let files = files_of(&recording, output)?;
         let made = make_folder(&files)?;
-        check_replaceable(&files, request.force)?;
+        check_replaceable(&files, request.all_inputs(&recording.video), request.force)?;
         let video = Video::open(&recording.video)?;
         if !request.force {
             check_same_input(&files, &recording, &video)?;

@@ -27,6 +27,8 @@ pub struct MaskRequest {
     pub(super) recipe: Option<Recipe>,
     /// Replaces a mask that differs from its record, and accepts another result of a recipe.
     pub force: bool,
+    /// Files that are not overwritten, even by force: other recordings, and those that hints were read from.
+    pub inputs: Vec<PathBuf>,
 }
 
 /// Which frames of the turn are looked at.
@@ -71,6 +73,7 @@ impl MaskRequest {
             settings,
             recipe: None,
             force: false,
+            inputs: Vec::new(),
         }
     }
 
@@ -81,6 +84,11 @@ impl MaskRequest {
             turn: TurnRequest::Sampled,
             ..self
         }
+    }
+
+    /// What is not overwritten when a mask of `recording` is made.
+    pub(super) fn all_inputs<'a>(&'a self, recording: &'a Path) -> impl Iterator<Item = &'a Path> {
+        self.inputs.iter().map(PathBuf::as_path).chain([recording])
     }
 
     /// Whether the object is to be found without a hint where it is; strokes correct what is found.

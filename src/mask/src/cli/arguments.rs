@@ -80,7 +80,8 @@ pub(crate) struct MaskArguments {
     seeds: Option<PathBuf>,
 
     /// Find the object without hints: in a video by what stands still during the turn (--rect and --seeds may be
-    /// added), in a photograph by its plain background
+    /// added), in a photograph by its plain background, unless
+    /// there are other hints
     #[arg(long)]
     auto: bool,
 
@@ -115,7 +116,7 @@ pub(crate) struct MaskArguments {
     )]
     engine: MaskEngine,
 
-    /// Keep every connected part, not only the largest
+    /// Keep every connected part, not only those of three tenths of the largest and more
     #[arg(long)]
     keep_all: bool,
 
@@ -156,6 +157,7 @@ impl MaskArguments {
             request = request.by_turn();
         }
         request.force = self.force;
+        request.inputs.extend(self.seeds.clone());
         request = request.with_engine(self.engine)?;
         if self.model.is_empty() {
             Ok(request)

@@ -7,6 +7,7 @@ use std::time::Instant;
 use relit_console::{Console, Done, Event, Outcome, RunTotals};
 use relit_data::counts::count_of;
 use relit_data::session::recording_name;
+use relit_data::still::is_named;
 use relit_mask::{MaskInputs, MaskOutput, MaskingError, edit, make_mask};
 use relit_web::Announcement;
 use serde_json::json;
@@ -62,7 +63,12 @@ fn draw(
 fn says_left_out(inputs: &MaskInputs, console: Console) -> Outcome {
     for path in &inputs.strays {
         let input = path.to_string_lossy().into_owned();
-        let message = "it is not a session, a video or a photograph".to_owned();
+        let message = if is_named(path) {
+            "it is a photograph beside recordings: name it as an input of its own"
+        } else {
+            "it is not a session, a video or a photograph"
+        };
+        let message = message.to_owned();
         console.print(
             &format!("{input}: left out: {message}"),
             &Event::LeftOut {
@@ -89,9 +95,10 @@ fn make(
     arguments: &MaskArguments,
     console: Console,
 ) -> Result<Outcome, MaskingError> {
-    let request = arguments.request()?;
+    let mut request = arguments.request()?;
     let found = says_left_out(&inputs, console);
     let paths = std::mem::take(&mut inputs.recordings);
+    request.inputs.extend(paths.iter().cloned());
     let bar = console.progress(paths.len() as u64, "masks");
     let mut totals = RunTotals::new(paths.len() as u64, Instant::now());
     let (mut failed, mut kept) = (0, 0);
@@ -117,17 +124,12 @@ fn make(
         bar.suspend(|| totals.say(console));
     }
     bar.finish_and_clear();
+    let made = paths.len() - failed - kept;
     if paths.len() > 1 || found != Outcome::Success {
         let left_out = inputs.strays.len();
-        say_summary(
-            console,
-            paths.len() - failed - kept,
-            kept,
-            left_out,
-            failed + inputs.faults.len(),
-        );
+        say_summary(console, made, kept, left_out, failed + inputs.faults.len());
     }
-    Ok(if failed == paths.len() {
+    Ok(if failed > 0 && made == 0 {
         Outcome::Failure
     } else if failed > 0 {
         Outcome::Partial

@@ -121,9 +121,10 @@ fn failure(error: MaskingError) -> Failure {
     let status = match &error {
         MaskingError::Mask(_) => StatusCode::UNPROCESSABLE_ENTITY,
         MaskingError::Video(VideoError::NoSuchFrame { .. }) => StatusCode::NOT_FOUND,
-        MaskingError::Handmade(_) | MaskingError::ForeignFile { .. } | MaskingError::Refused(_) => {
-            StatusCode::CONFLICT
-        }
+        MaskingError::Handmade(_)
+        | MaskingError::IsInput(_)
+        | MaskingError::ForeignFile { .. }
+        | MaskingError::Refused(_) => StatusCode::CONFLICT,
         _ => StatusCode::INTERNAL_SERVER_ERROR,
     };
     Failure::new(status, with_causes(&error))

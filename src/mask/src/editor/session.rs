@@ -139,7 +139,8 @@ impl EditorSession {
         }
         let _made = make_folder(&self.files)?;
         // Somebody may have painted one meanwhile.
-        check_replaceable(&self.files, request.force)?;
+        let inputs = request.all_inputs(self.video.path());
+        check_replaceable(&self.files, inputs, request.force)?;
         let source = frame.source.clone();
         let turn = turn.as_deref();
         write_files(&frame.picture, source, turn, &mask, &self.files, &request)

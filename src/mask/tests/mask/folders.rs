@@ -97,6 +97,63 @@ fn masks_that_were_made_by_hand_are_kept_and_are_no_failure() {
 }
 
 #[test]
+fn no_input_is_overwritten_even_by_force() {
+    let folder = photographs();
+    let path = folder.path();
+    let before = read(path, "photos/cup.png");
+    let line = ["photos", "--rect", BOX, "-o", "photos", "--force"];
+    assert_eq!(code(&relit_mask(path, &line)), 1);
+    assert_eq!(read(path, "photos/cup.png"), before);
+    fs::write(path.join("mask.png"), &before).unwrap();
+    let line = ["mask.png", "--rect", BOX, "--force"];
+    assert_eq!(code(&relit_mask(path, &line)), 1);
+    assert_eq!(read(path, "mask.png"), before);
+
+    // Where a preview would be.
+    photograph(15.0).save(path.join("jug.jpg")).unwrap();
+    fs::write(path.join("jug-preview.png"), &before).unwrap();
+    let line = ["jug.jpg", "--rect", BOX, "-o", "jug.png"];
+    assert_eq!(code(&relit_mask(path, &line)), 1);
+    let line = [
+        "jug.jpg",
+        "jug-preview.png",
+        "--rect",
+        BOX,
+        "-o",
+        ".",
+        "--force",
+    ];
+    assert_eq!(code(&relit_mask(path, &line)), 1);
+    let line = [
+        "jug.jpg",
+        "--seeds",
+        "jug-preview.png",
+        "-o",
+        "jug.png",
+        "--force",
+    ];
+    assert_eq!(code(&relit_mask(path, &line)), 1);
+    assert_eq!(read(path, "jug-preview.png"), before);
+    assert!(!path.join("jug.json").exists());
+}
+
+#[test]
+fn photographs_are_masked_again_beside_their_masks() {
+    let folder = tempfile::tempdir().unwrap();
+    let photos = folder.path().join("photos");
+    fs::create_dir(&photos).unwrap();
+    for name in ["bowl.jpg", "cup.jpg"] {
+        photograph(15.0).save(photos.join(name)).unwrap();
+    }
+    for _ in 0..2 {
+        let line = ["photos", "--rect", BOX, "-o", "photos", "--json"];
+        let output = relit_mask(folder.path(), &line);
+        assert_eq!(code(&output), 0, "{}", said(&output));
+        assert_eq!(events(&output, "mask").len(), 2);
+    }
+}
+
+#[test]
 fn a_folder_of_one_clip_gives_a_mask_of_the_clips_name() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("videos")).unwrap();
