@@ -170,3 +170,15 @@ fn a_lamp_from_the_right_lights_the_right_half() {
     let [left, right] = [3, 20].map(|x| image.planes().pixel(x, 12)[0]);
     assert!(right > 1.5 * left, "{left} {right}");
 }
+
+#[test]
+fn no_input_is_overwritten() {
+    let scene = Scene::new();
+    let before = fs::read(scene.path("up.png")).unwrap();
+    for outputs in ["-o up.png", "-o lit.png --save-light up.png"] {
+        let line = format!("--normals up.png --light light.txt {outputs}");
+        assert_eq!(code(&scene.image_of(&line)), 1);
+    }
+    assert_eq!(fs::read(scene.path("up.png")).unwrap(), before);
+    assert!(!scene.path("lit.png").exists());
+}

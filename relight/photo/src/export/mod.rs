@@ -23,7 +23,7 @@ use relight_core::image::ImageError;
 pub use glb::to_glb;
 pub use layers::to_layers;
 pub use mesh::ObjectMesh;
-pub use source::{is_object, read_object};
+pub use source::{is_object, object_files, read_object};
 
 /// That an object does not fit into a file.
 fn not_encoded(fault: impl Display) -> ImageError {

@@ -1,7 +1,7 @@
 //! An object out of `object.relit`, or a folder of `relight turn` or `relight decompose`.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::read_planes;
@@ -12,6 +12,12 @@ use serde::Deserialize;
 
 /// The figures of a decomposition, and those of a turn.
 const FIGURES: [&str; 2] = ["decomposition.json", "turn.json"];
+
+/// The maps in a folder.
+const MASK: &str = "mask.png";
+const NORMALS: &str = "normal.png";
+const ALBEDO: &str = "albedo.png";
+const CONFIDENCE: &str = "confidence.png";
 
 /// The figures that the maps do not have.
 #[derive(Deserialize)]
@@ -69,6 +75,17 @@ pub fn read_object(path: &Path) -> Result<CapturedObject, ImageError> {
     read_maps(path, figures)
 }
 
+/// The files that [`read_object`] may read.
+#[must_use]
+pub fn object_files(path: &Path) -> Vec<PathBuf> {
+    if path.is_dir() {
+        let names = [MASK, NORMALS, ALBEDO, CONFIDENCE, CapturedObject::FILE];
+        names.map(|name| path.join(name)).to_vec()
+    } else {
+        vec![path.to_owned()]
+    }
+}
+
 fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ImageError> {
     let file = folder.join(figures);
     let wrong = |reason: String| ImageError::file(&file, format!("cannot be read: {reason}"));
@@ -79,10 +96,10 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ImageError>
     if !(white.is_finite() && white >= 0.0) {
         return Err(wrong("white.albedo is not a number from 0 up".to_owned()));
     }
-    let (mask, _) = read_planes(&folder.join("mask.png"))?;
+    let (mask, _) = read_planes(&folder.join(MASK))?;
     let alpha = Planes::from_planes(mask.extent(), [mask.plane(0).to_vec()])?;
-    let normals = Normals::read(&folder.join("normal.png"))?;
-    let albedo = Rgb::read(&folder.join("albedo.png"), Transfer::Srgb)?;
+    let normals = Normals::read(&folder.join(NORMALS))?;
+    let albedo = Rgb::read(&folder.join(ALBEDO), Transfer::Srgb)?;
     let albedo = Rgb::new(albedo.into_planes().map(|value| value * white));
     let extent = normals.extent();
     let gloss = figures
@@ -90,7 +107,7 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ImageError>
         .or(figures.specular)
         .and_then(|gloss| Some((gloss.reflectance?, gloss.smoothness?)))
         .map(|(reflectance, smoothness)| Gloss::even(extent, [reflectance; 3], smoothness));
-    let confidence = match read_planes(&folder.join("confidence.png")) {
+    let confidence = match read_planes(&folder.join(CONFIDENCE)) {
         Ok((map, _)) => Planes::from_planes(map.extent(), [map.plane(0).to_vec()])?,
         Err(_) => Planes::filled(extent, [1.0]),
     };

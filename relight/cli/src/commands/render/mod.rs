@@ -16,6 +16,7 @@ use serde_json::json;
 use self::object::{Map, ObjectArguments};
 use crate::commands::CommandResult;
 use crate::lighting::{LightArguments, RotationArguments, ShadingArgument};
+use crate::photos::not_an_input;
 use crate::values::within;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -100,6 +101,20 @@ impl ImageArguments {
         Some(format!("--output {}: give {wanted}", self.output.display()))
     }
 
+    /// Refuses to overwrite what is read, and one result by the other.
+    fn check_outputs(&self) -> Result<(), String> {
+        if self.save_light.as_ref() == Some(&self.output) {
+            let output = self.output.display();
+            return Err(format!(
+                "{output} is named twice: give the light another name"
+            ));
+        }
+        let mut inputs = self.object.inputs();
+        inputs.extend(self.light.light.clone());
+        let mut outputs = self.save_light.iter().chain([&self.output]);
+        outputs.try_for_each(|output| not_an_input(output, &inputs))
+    }
+
     /// The light, rotated; written to a file on request.
     fn read_light(&self) -> Result<ShLight, Box<dyn Error>> {
         let order = self.order.map(|order| Order::new(order.into()));
@@ -138,6 +153,7 @@ impl ImageArguments {
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let RenderedResult::Image(arguments) = &arguments.result;
+    arguments.check_outputs()?;
     let scene = LitObject::read(arguments)?;
     let frames = match OutputKind::from_path(&arguments.output) {
         Some(OutputKind::Movie(format)) => film(arguments, format, &scene, console)?,

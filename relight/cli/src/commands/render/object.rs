@@ -10,7 +10,7 @@ use relight_core::image::{
 };
 use relight_core::light::{Normals, NormalsFrame};
 use relight_core::render::{Gloss, Surface};
-use relight_photo::export::read_object;
+use relight_photo::export::{object_files, read_object};
 
 use crate::inputs::{NormalsArgument, TransferArgument};
 
@@ -50,6 +50,22 @@ pub(super) struct ObjectArguments {
 }
 
 impl ObjectArguments {
+    /// What is read.
+    pub(super) fn inputs(&self) -> Vec<PathBuf> {
+        let object = self.object.iter().flat_map(|path| object_files(path));
+        let files = self.normals.iter().chain(&self.mask).cloned();
+        let maps = [
+            Some(&self.albedo),
+            Some(&self.smoothness),
+            self.reflectance.as_ref(),
+        ];
+        let maps = maps.into_iter().flatten().filter_map(|map| match map {
+            Map::File(path) => Some(path.clone()),
+            Map::Even(_) => None,
+        });
+        object.chain(files).chain(maps).collect()
+    }
+
     /// Reads the object.
     ///
     /// # Errors
