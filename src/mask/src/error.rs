@@ -25,7 +25,7 @@ pub enum MaskingError {
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
     OutputName(PathBuf),
-    /// A mask that differs from its record, or has none; or a preview without a record.
+    /// A mask that differs from its record, or has none.
     #[error(
         "{0} was not made by this program, or was changed since: give --force to replace it, or another name with -o"
     )]
@@ -45,10 +45,8 @@ pub enum MaskingError {
         /// The video or photograph that it was made of, as its record names it.
         input: String,
     },
-    /// Another file has the name of the record.
-    #[error(
-        "{path} would be overwritten, but is not a mask's record ({why}): move it away, or give another name with -o"
-    )]
+    /// Another file has the name of the record, or of the preview.
+    #[error("{path} would be overwritten, but {why}: move it away, or give another name with -o")]
     ForeignFile {
         /// The file.
         path: PathBuf,
@@ -96,7 +94,7 @@ pub enum MaskingError {
 }
 
 impl MaskingError {
-    /// The file that was made by hand, if that is why none was made.
+    /// The mask that was made by hand, if that is why none was made.
     #[must_use]
     pub fn handmade(&self) -> Option<&Path> {
         match self {

@@ -55,16 +55,17 @@ pub(super) fn check_replaceable<'a>(
     inputs: impl IntoIterator<Item = &'a Path>,
     force: bool,
 ) -> Result<(), MaskingError> {
-    let written = [&files.mask, &files.preview].map(|path| (path, fs::canonicalize(path).ok()));
-    for input in inputs
-        .into_iter()
-        .filter_map(|path| fs::canonicalize(path).ok())
-    {
-        if let Some((path, _)) = written
-            .iter()
-            .find(|(_, whole)| whole.as_ref() == Some(&input))
+    let written =
+        [&files.mask, &files.preview].map(|path| Some((path, fs::canonicalize(path).ok()?)));
+    let there: Vec<_> = written.into_iter().flatten().collect();
+    if !there.is_empty() {
+        for input in inputs
+            .into_iter()
+            .filter_map(|path| fs::canonicalize(path).ok())
         {
-            return Err(MaskingError::IsInput((*path).clone()));
+            if let Some((path, _)) = there.iter().find(|(_, whole)| *whole == input) {
+                return Err(MaskingError::IsInput((*path).clone()));
+            }
         }
     }
     let record = read_record(&files.record)?;
@@ -73,11 +74,14 @@ pub(super) fn check_replaceable<'a>(
     if force {
         return Ok(());
     }
-    if record.is_none() && files.preview.exists() {
-        return Err(MaskingError::Handmade(files.preview.clone()));
-    }
     let Some(mask) = read_if_exists(&files.mask)? else {
-        return Ok(());
+        return match record {
+            None if files.preview.exists() => Err(MaskingError::ForeignFile {
+                path: files.preview.clone(),
+                why: "no record says that it is a mask's preview".to_owned(),
+            }),
+            _ => Ok(()),
+        };
     };
     let found = blake3::hash(&mask).to_hex();
     match record {
@@ -100,7 +104,7 @@ pub(super) fn read_record(path: &Path) -> Result<Option<MaskRecord>, MaskingErro
     };
     let record = MaskRecord::from_json(&bytes).map_err(|why| MaskingError::ForeignFile {
         path: path.to_owned(),
-        why,
+        why: format!("it is not a mask's record ({why})"),
     })?;
     Ok(Some(record))
 }

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
-use relit_data::file_names::{folded, is_hidden};
+use relit_data::file_names::folded;
 use relit_data::session::{
     MANIFEST_FILE, MASK_SUFFIX, SessionError, beside_recordings, clips, mask_stem, recordings,
 };
@@ -128,13 +128,16 @@ impl MaskInputs {
             None => return Ok(None),
         };
         name.push(".png");
-        if !self.named.insert(folded(&name.to_string_lossy())) {
-            return Err(MaskingError::Refused(format!(
-                "the mask {} is that of another input of this call: rename one, or mask it in a call of its own with -o",
-                folder.join(name).display()
-            )));
+        let files = MaskFiles::from_mask_path(&folder.join(name))?;
+        for path in [&files.preview, &files.mask] {
+            if !self.named.insert(folded(&path.to_string_lossy())) {
+                return Err(MaskingError::Refused(format!(
+                    "{} is also that of another input of this call: rename one, or mask it in a call of its own with -o",
+                    path.display()
+                )));
+            }
         }
-        MaskFiles::from_mask_path(&folder.join(name)).map(Some)
+        Ok(Some(files))
     }
 }
 
@@ -145,7 +148,7 @@ fn photographs(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), SessionErr
         return Ok(Default::default());
     }
     let beside = beside_recordings(folder)?;
-    let is_photograph = |path: &PathBuf| path.is_file() && is_named(path) && !is_hidden(path);
+    let is_photograph = |path: &PathBuf| path.is_file() && is_named(path);
     let (pictures, others): (Vec<_>, Vec<_>) = beside.into_iter().partition(is_photograph);
     let photographs = pictures.into_iter().filter(|path| !is_of_mask(path));
     Ok((photographs.collect(), others))
@@ -153,11 +156,11 @@ fn photographs(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), SessionErr
 
 /// Whether a file is a mask that this program made, or goes with one, by its record.
 fn is_of_mask(path: &Path) -> bool {
-    let name = path.file_name().and_then(OsStr::to_str).unwrap_or_default();
-    let mut stems = ENDINGS.iter().filter_map(|ending| {
-        let (stem, end) = name.split_at_checked(name.len().checked_sub(ending.len())?)?;
-        end.eq_ignore_ascii_case(ending).then_some(stem)
-    });
+    let name = path.file_name().and_then(OsStr::to_str);
+    let name = name.unwrap_or_default();
+    let mut stems = ENDINGS
+        .iter()
+        .filter_map(|ending| name.strip_suffix(ending));
     stems.any(|stem| {
         let record = path.with_file_name(format!("{stem}.json"));
         matches!(read_record(&record), Ok(Some(_)))

@@ -175,8 +175,8 @@ pub(super) fn write_files(
     let json = record.to_json();
     let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
     keep_recipe(files, &record)?;
-    write(&files.preview, &preview_png)?;
     write(&files.record, &json)?;
+    write(&files.preview, &preview_png)?;
     write(&files.mask, &png)?;
     Ok(record)
 }

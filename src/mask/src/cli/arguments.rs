@@ -80,8 +80,7 @@ pub(crate) struct MaskArguments {
     seeds: Option<PathBuf>,
 
     /// Find the object without hints: in a video by what stands still during the turn (--rect and --seeds may be
-    /// added), in a photograph by its plain background, unless
-    /// there are other hints
+    /// added), in a photograph by its plain background (other hints count alone)
     #[arg(long)]
     auto: bool,
 
@@ -116,7 +115,7 @@ pub(crate) struct MaskArguments {
     )]
     engine: MaskEngine,
 
-    /// Keep every connected part, not only those of three tenths of the largest and more
+    /// Keep every connected part, also those smaller than three tenths of the largest
     #[arg(long)]
     keep_all: bool,
 

@@ -139,7 +139,7 @@ impl EditorSession {
         }
         let _made = make_folder(&self.files)?;
         // Somebody may have painted one meanwhile.
-        let inputs = request.all_inputs(self.video.path());
+        let inputs = self.request.all_inputs(self.video.path());
         check_replaceable(&self.files, inputs, request.force)?;
         let source = frame.source.clone();
         let turn = turn.as_deref();
