@@ -1,12 +1,13 @@
 """The network that tells which object of a picture hints mean (src/grabcut/src/by_hints): its data and its training.
 
     relight synth samples --count 5000 --size 192 --views 1 --lightings 2 --meshes MESHES --panoramas PANORAMAS -o DATA/samples
-    python photo_network.py make MESHES PANORAMAS DATA --views 210
-    python photo_network.py train DATA --minutes 85 -o src/grabcut/src/by_hints/weights.safetensors
+    python photo_network.py make MESHES PANORAMAS DATA
+    python photo_network.py train DATA --minutes 66 --learning-rate 2e-3 -o src/grabcut/src/by_hints/weights.safetensors
 
 With the packages of requirements-network.txt. `make` renders scenes, objects on a disc in a room, by turns.py; DATA/scenes
 gets one file a picture, colours and the object's coverage, and DATA/rooms the panoramas. `train` composes what it learns
-from: three in ten are scenes, the others objects of scenes and samples on backgrounds that are panoramas, scenes, or drawn.
+from: three in ten are scenes, the others objects of scenes and samples, or drawn, on backgrounds that are panoramas, scenes,
+or drawn.
 """
 
 import argparse
@@ -18,6 +19,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+import efficientnet
 import turns
 import unet
 
@@ -28,10 +30,11 @@ SCENE, SHOTS, LIGHTINGS = (320, 240), 4, 2
 SIDE, PLANES, AROUND = 192, 9, 0.3
 COARSE, FINE, RARE, MAX_RATIO = 3, 4, 1e-4, 5
 UNMARKED, OBJECT, BACKGROUND = range(3)
-HINTS = {"tight": 0.25, "loose": 0.26, "cut": 0.14, "strokes": 0.2, "both": 0.07, "dense": 0.08}
+HINTS = {"tight": 0.2, "loose": 0.24, "cut": 0.2, "whole": 0.04, "strokes": 0.16, "of object": 0.04, "both": 0.06, "dense": 0.06}
 BATCH, FRESH, KEPT = 8, 4, 4000
 # An object of fewer pixels is left out.
 MIN_PIXELS = 60
+LETTERS = "ABCDEGHKMNORSTUaegknors012358"
 
 
 class BrightTable(turns.Paint):
@@ -105,7 +108,9 @@ class Sources:
     def cut_out(self):
         """A picture of an object, 0 to 1, and its coverage."""
         rng = self.rng
-        if rng.random() < 0.45:
+        if rng.random() < 0.22:
+            picture, cover = self.printed()
+        elif rng.random() < 0.45:
             folder = self.samples[rng.integers(len(self.samples))]
             picture = cv2.imread(str(folder / "image.png"))
             cover = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE).astype(np.float32) / 255
@@ -129,6 +134,47 @@ class Sources:
         if rng.random() < 0.3:
             picture, cover = turned(picture, cover, rng.uniform(-40, 40))
         return picture, cover
+
+    def printed(self):
+        """A drawn object with a print, 8 bits, and its coverage: a card, a box, a tin or a lump."""
+        rng = self.rng
+        side = int(rng.integers(96, 256))
+        faces = rng.choice([card, carton, tin, lump])(rng)
+        cover, light = np.zeros((2, 2 * side, 2 * side), np.float32)
+        for corners, brightness in faces:
+            corners = [np.round((1 + 0.6 * corners) * side).astype(np.int32)]
+            cv2.fillPoly(cover, corners, 1)
+            cv2.fillPoly(light, corners, brightness)
+        cover, light = scaled(cover, factor=0.5), scaled(light, factor=0.5)
+        across = np.linspace(-1, 1, side)
+        light = light * (1 + rng.uniform(-0.3, 0.3) * across + rng.uniform(-0.3, 0.3) * across[:, None])
+        return np.clip(255 * self.pattern((side, side)) * light[..., None], 0, 255).astype(np.uint8), cover
+
+    def pattern(self, size):
+        """Panels, discs, bands and letters of few colours, leaves, or noise."""
+        rng = self.rng
+        chance = rng.random()
+        if chance < 0.45:
+            return self.leaves(size) if chance < 0.3 else self.texture(size)
+        colours = rng.uniform(0, 255, (rng.integers(2, 5), 3))
+        colour = lambda: colours[rng.integers(len(colours))].tolist()
+        within = lambda least, most, side: int(rng.uniform(least, most) * side)
+        wide, high = size
+        picture = np.full((high, wide, 3), colours[0], np.uint8)
+        for _ in range(rng.integers(1, 6)):
+            x, y = within(-0.2, 0.9, wide), within(-0.2, 0.9, high)
+            kind = rng.choice(["panel", "disc", "band"])
+            if kind == "panel":
+                cv2.rectangle(picture, (x, y), (x + within(0.1, 1, wide), y + within(0.1, 0.8, high)), colour(), -1)
+            elif kind == "disc":
+                cv2.circle(picture, (x, y), within(0.05, 0.5, wide), colour(), -1, cv2.LINE_AA)
+            else:
+                cv2.rectangle(picture, (0, y), (wide, y + within(0.03, 0.3, high)), colour(), -1)
+        for _ in range(rng.integers(0, 8)):
+            text = "".join(rng.choice(list(LETTERS), rng.integers(2, 9)))
+            place, font = (within(-0.1, 0.8, wide), within(0, 1, high)), int(rng.integers(0, 5))
+            cv2.putText(picture, text, place, font, rng.uniform(0.3, 2), colour(), int(rng.integers(1, 5)), cv2.LINE_AA)
+        return picture.astype(np.float32) / 255
 
     def background(self, size):
         rng = self.rng
@@ -203,6 +249,46 @@ class Sources:
         rng = self.rng
         ramp = np.linspace(-1, 1, size[1])[:, None, None] * rng.normal() + np.linspace(-1, 1, size[0])[:, None] * rng.normal()
         return np.clip(rng.uniform(0, 1, 3) + rng.uniform(-0.3, 0.3, 3) * ramp, 0, 1)
+
+
+def card(rng):
+    """Faces of a drawn object: corners from -1 to 1, and brightness."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * rng.uniform(0.4, 1, 2) + rng.normal(0, 0.08, (4, 2))
+    return [(corners @ rotation(rng.uniform(-0.5, 0.5)), 1.0)]
+
+
+def carton(rng):
+    high, wide, deep = rng.uniform(0.5, 1), rng.uniform(0.3, 0.7), rng.uniform(0.1, 0.6) * rng.choice([-1, 1])
+    up, side = rng.uniform(0.15, 0.5) * abs(deep), wide * np.sign(deep)
+    front = [[-wide, -high], [wide, -high], [wide, high], [-wide, high]]
+    flank = [[side, -high], [side + deep, -high - up], [side + deep, high - up], [side, high]]
+    top = [[-wide, -high], [wide, -high], [wide + deep, -high - up], [-wide + deep, -high - up]]
+    about, middle = rotation(rng.normal(0, 0.1)), [deep / 2, -up / 2]
+    return [((np.array(face) - middle) @ about, rng.uniform(0.35, 1.2)) for face in (front, flank, top)]
+
+
+def tin(rng):
+    """Upright strips, the darker the farther from where the light comes from."""
+    wide, high = rng.uniform(0.3, 0.7), rng.uniform(0.5, 1)
+    bulge, lit = wide * rng.uniform(0.1, 0.4), rng.uniform(-0.5, 0.5)
+    edges = np.linspace(-1, 1, 33)
+    bend = bulge * np.sqrt(1 - edges**2)
+    strips = zip(zip(edges, bend), zip(edges[1:], bend[1:]))
+    corners = lambda a, b, c, d: np.array([[wide * a, -high - b], [wide * c, -high - d], [wide * c, high + d], [wide * a, high + b]])
+    body = [(corners(*left, *right), np.clip(1.1 - 0.8 * (left[0] - lit) ** 2, 0.1, 1.2)) for left, right in strips]
+    around = np.stack([wide * edges, bend], -1)
+    lid = np.concatenate([around, -around]) - [0, high]
+    return [*body, (lid, rng.uniform(0.5, 1.2))]
+
+
+def lump(rng):
+    angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    ellipse = lambda: np.stack([np.cos(angle), np.sin(angle)], -1) * rng.uniform(0.2, 0.7, 2) @ rotation(rng.uniform(0, np.pi))
+    return [(ellipse() + rng.uniform(-0.5, 0.5, 2), 1.0) for _ in range(rng.integers(2, 5))]
+
+
+def rotation(angle):
+    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
 def turned(picture, cover, angle):
@@ -283,8 +369,11 @@ def coloured(picture, cover, scene, around, sources):
         picture = picture * np.clip(brightness, 0, 1.3 / max(picture.max(), 1e-3))
     if rng.random() < 0.25:
         picture = picture + (around.reshape(-1, 3).mean(0) - inside.mean(0)) * rng.uniform(0.2, 0.8)
-    if rng.random() < 0.3:
-        size = picture.shape[1::-1]
+    size, chance = picture.shape[1::-1], rng.random()
+    if chance < 0.15:
+        shading = picture.mean(-1, keepdims=True)
+        picture = sources.pattern(size) * shading / max(np.quantile(shading, 0.9), 1e-2) * rng.uniform(0.7, 1.2)
+    elif chance < 0.4:
         picture = picture * (0.3 + 1.2 * (sources.texture(size) if rng.random() < 0.5 else sources.leaves(size)))
     return np.clip(picture, 0, 1).astype(np.float32)
 
@@ -328,19 +417,21 @@ def hinted(truth, rng):
     elif kind == "cut":
         for side in rng.choice(4, rng.choice([1, 1, 1, 2]), replace=False):
             free[side] = -rng.uniform(0.03, 0.22) * (wide, high)[side % 2]
-    box = None if kind == "strokes" else clipped(bounds + [-free[0], -free[1], free[2], free[3]], width, height)
+    elif kind == "whole":
+        free = np.abs(np.array([0, 0, width, height]) - bounds) - rng.uniform(0, 0.03, 4) * max(width, height)
+    box = None if kind in ("strokes", "of object") else clipped(bounds + [-free[0], -free[1], free[2], free[3]], width, height)
     if box is not None and (min(box[2] - box[0], box[3] - box[1]) < 6 or not inside[box[1] : box[3], box[0] : box[2]].any()):
         return hinted(truth, rng)
-    if kind in ("strokes", "both"):
+    if kind in ("strokes", "of object", "both"):
         deep, far = opened(inside, 2)
         if box is not None:
             far &= within(box, truth.shape)
-        if box is None and rng.random() < 0.5:
+        if kind == "strokes" and rng.random() < 0.5:
             frame = np.zeros(truth.shape, np.uint8)
             margin = int(rng.uniform(2, 12))
             cv2.rectangle(frame, (margin, margin), (width - margin, height - margin), 255, int(rng.integers(1, 5)))
             marks[(frame > 0) & far] = BACKGROUND
-        else:
+        elif kind != "of object":
             for _ in range(rng.integers(1, 5)):
                 stroke(marks, far, BACKGROUND, int(rng.integers(1, 6)), rng)
         for _ in range(rng.integers(1, 4)):
@@ -452,19 +543,25 @@ def overlap(network, examples):
     return turns.mean(np.array(found))
 
 
+def network_of():
+    return unet.Network(PLANES, 1, efficientnet.encoder(PLANES + 2), efficientnet.SKIPS)
+
+
 def train(arguments):
     sources = Sources(arguments.data, True, np.random.default_rng(1))
     validation = [example(sources) for _ in range(100)]
     queue = multiprocessing.Queue(64)
     multiprocessing.Process(target=compose, args=(arguments.data, 7, queue), daemon=True).start()
-    network, mean = (unet.Network(PLANES, 1) for _ in range(2))
+    torch.manual_seed(0)
+    network, mean = (network_of() for _ in range(2))
+    efficientnet.take(network.encoder)
     overlap_of = lambda network: overlap(network, validation)
     unet.fit(network, mean, batches(queue, np.random.default_rng(99)), loss, overlap_of, arguments)
 
 
 def parity(arguments):
     """Planes and logits of a pattern, for the test of src/grabcut/src/by_hints/odds.rs."""
-    network = unet.read(unet.Network(PLANES, 1), arguments.weights)
+    network = unet.read(network_of(), arguments.weights)
     down, across = np.mgrid[0:SIDE, 0:SIDE]
     level = lambda channel: (3 * across + down * (5 + channel) + across * down // 7 + 60 * (across // 48) * channel) % 256
     picture = np.stack([level(channel) for channel in (2, 1, 0)], -1).astype(np.uint8)
@@ -484,7 +581,7 @@ def main():
     making = verbs.add_parser("make")
     for name in ("meshes", "panoramas", "data"):
         making.add_argument(name, type=pathlib.Path)
-    making.add_argument("--views", type=int, default=210)
+    making.add_argument("--views", type=int, default=360)
     making.add_argument("--seed", type=int, default=0)
     making.set_defaults(run=make)
     training = verbs.add_parser("train")

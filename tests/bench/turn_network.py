@@ -318,6 +318,7 @@ def batches(folder, rng):
 def train(arguments):
     validation = sorted((arguments.data / "validation").glob("*.npy"))
     overlap = lambda network: turns.mean(overlaps(network, validation))
+    torch.manual_seed(0)
     network, mean = (unet.Network(PLANES, CLASSES) for _ in range(2))
     unet.fit(network, mean, batches(arguments.data / "train", np.random.default_rng(0)), loss, overlap, arguments)
 

@@ -16,6 +16,10 @@ from torch.nn.functional import interpolate
 WIDTHS, NARROW, HEAD = (24, 40, 56, 72, 88), 12, 16
 # Residual blocks of the encoder at each size.
 RESIDUAL = (0, 1, 2, 2, 2)
+# A layer of so many weights is large.
+MANY = 10_000
+# The learning rate of what has learned already, as a share.
+OF_LEARNED = 0.25
 KINDS = {np.float16: "F16", np.int8: "I8"}
 
 
@@ -36,27 +40,45 @@ class Residual(nn.Module):
 
 
 class Network(nn.Module):
-    """Logits of `classes` from `planes`, to which column and row are added."""
+    """Logits of `classes` from `planes`, to which column and row are added. `learned` are the blocks of the encoder's
+    first sizes, if they have learned already, and `skips` their channels."""
 
-    def __init__(self, planes, classes):
+    def __init__(self, planes, classes, learned=(), skips=()):
         super().__init__()
-        sizes = [planes + 2, *WIDTHS]
-        pairs = list(zip(sizes, sizes[1:]))
-        blocks = [[Residual(b) for _ in range(many)] for b, many in zip(WIDTHS, RESIDUAL)]
-        self.encoder = nn.ModuleList(nn.Sequential(layer(a, b), layer(b, b), *of) for (a, b), of in zip(pairs, blocks))
-        decoder = [nn.Sequential(layer(b + a, a), layer(a, a)) for a, b in pairs[:0:-1]]
+        inputs = [planes + 2, *skips, *WIDTHS[len(skips) :]]
+        own = [self.block(inputs[at], at) for at in range(len(skips), len(WIDTHS))]
+        self.encoder = nn.ModuleList([*learned, *own])
+        self.learned = len(skips)
+        decoder = [
+            nn.Sequential(layer(up + skip, out), layer(out, out))
+            for up, skip, out in zip(WIDTHS[:0:-1], inputs[-2:0:-1], WIDTHS[-2::-1])
+        ]
         decoder[-1] = decoder[-1][:1]
         self.decoder = nn.ModuleList(decoder)
         self.narrow = layer(WIDTHS[0], NARROW)
-        self.head = nn.Sequential(layer(NARROW + sizes[0], HEAD), nn.Conv2d(HEAD, classes, 3, 1, 1))
+        self.head = nn.Sequential(layer(NARROW + inputs[0], HEAD), nn.Conv2d(HEAD, classes, 3, 1, 1))
+
+    @staticmethod
+    def block(inputs, at):
+        width = WIDTHS[at]
+        return nn.Sequential(layer(inputs, width), layer(width, width), *(Residual(width) for _ in range(RESIDUAL[at])))
+
+    def groups(self, learning_rate):
+        """The parameters, with their learning rates: those that have learned already change less."""
+        learned = [*self.encoder[: self.learned].parameters()]
+        known = set(map(id, learned))
+        others = [own for own in self.parameters() if id(own) not in known]
+        rates = [(learned, OF_LEARNED * learning_rate), (others, learning_rate)]
+        return [{"params": own, "most": rate} for own, rate in rates if own]
 
     def forward(self, seen):
         many, _, height, width = seen.shape
         across = torch.linspace(-1, 1, width).expand(many, 1, height, width)
         down = torch.linspace(-1, 1, height)[:, None].expand(many, 1, height, width)
         sizes = [torch.cat([seen, across, down], 1)]
-        for layers in self.encoder:
-            sizes.append(layers(functional.avg_pool2d(sizes[-1], 2)))
+        for at, layers in enumerate(self.encoder):
+            # Blocks that have learned halve by themselves.
+            sizes.append(layers(sizes[-1] if at < self.learned else functional.avg_pool2d(sizes[-1], 2)))
         planes = sizes.pop()
         for layers in self.decoder:
             planes = layers(torch.cat([interpolate(planes, scale_factor=2.0), sizes.pop()], 1))
@@ -100,19 +122,18 @@ def fit(network, mean, batches, loss_of, overlap_of, arguments):
 
     `loss_of` is called with logits and shares, `overlap_of` with the mean network for its overlap as text.
     """
-    torch.manual_seed(0)
     network.to(memory_format=torch.channels_last)
     if arguments.begin:
         begin(network, arguments.begin)
     mean.load_state_dict(network.state_dict())
-    optimiser = torch.optim.AdamW(network.parameters(), lr=arguments.learning_rate, weight_decay=1e-2)
+    optimiser = torch.optim.AdamW(network.groups(arguments.learning_rate), weight_decay=1e-2)
     begun, recent = time.monotonic(), []
     for step, (seen, shares) in enumerate(prepared(batches)):
         done = (time.monotonic() - begun) / 60 / arguments.minutes
         if done >= 1:
             break
         for group in optimiser.param_groups:
-            group["lr"] = arguments.learning_rate * min(1, step / 100 + 0.01) * (0.5 + 0.5 * math.cos(math.pi * done) + 0.002)
+            group["lr"] = group["most"] * min(1, step / 100 + 0.01) * (0.5 + 0.5 * math.cos(math.pi * done) + 0.002)
         network.train()
         with torch.autocast("cpu", torch.bfloat16):
             logits = network(seen)
@@ -147,18 +168,22 @@ def convolutions(network):
             yield parent if has_normal else name, module, normal if has_normal else None
 
 
+@torch.no_grad()
 def write(network, path):
-    """The weights as safetensors, with the normalisation in the convolutions: integers of 8 bits with a scale for each
-    output channel, and 16-bit biases."""
+    """The weights as safetensors, with the normalisation in the convolutions: 16-bit numbers, of large layers integers of
+    8 bits with a scale for each output channel."""
     tensors = {}
     for name, convolution, normal in convolutions(network):
         weight, bias = convolution.weight, convolution.bias
         if normal:
             scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
             weight, bias = weight * scale[:, None, None, None], normal.bias - normal.running_mean * scale
-        scale = weight.abs().amax((1, 2, 3)).clamp(min=1e-6) / 127
-        tensors[f"{name}.weight"] = torch.round(weight / scale[:, None, None, None]).detach().numpy().astype(np.int8)
-        tensors[f"{name}.bias"], tensors[f"{name}.scale"] = (of.detach().numpy().astype(np.float16) for of in (bias, scale))
+        of_layer = {"weight": weight, "bias": bias}
+        if weight.numel() >= MANY:
+            of_layer["scale"] = weight.abs().amax((1, 2, 3)).clamp(min=1e-6) / 127
+            tensors[f"{name}.weight"] = torch.round(of_layer.pop("weight") / of_layer["scale"][:, None, None, None]).numpy().astype(np.int8)
+        for part, numbers in of_layer.items():
+            tensors[f"{name}.{part}"] = numbers.numpy().astype(np.float16)
     header, data = {}, b""
     for name, tensor in sorted(tensors.items()):
         own = tensor.tobytes()
@@ -185,7 +210,8 @@ def read(network, path):
             convolution.weight.copy_(tensors[f"{name}.weight"] * scale)
             (normal or convolution).bias.copy_(tensors[f"{name}.bias"])
             if normal:
-                nn.init.ones_(normal.weight)
+                normal.reset_running_stats()
+                nn.init.constant_(normal.weight, math.sqrt(1 + normal.eps))
     return network.eval()
 
 

@@ -27,7 +27,7 @@ const MIN_OF_HINTS: f32 = 0.85;
 /// A turn's mask gets a warning if its expected overlap with the object is smaller.
 const UNSURE: f32 = 0.88;
 /// A mask by hints gets a warning if its expected overlap is smaller.
-const UNSURE_BY_HINTS: f32 = 0.6;
+const UNSURE_BY_HINTS: f32 = 0.75;
 /// Models learn from what is around a rectangle within this share of its longer side.
 const NEAR: f64 = 0.8;
 /// The share of a rectangle that is background: a person leaves about half free.

@@ -8,7 +8,7 @@ use crate::cut::pyramid::InitialModels;
 pub(crate) use odds::odds;
 
 /// Weight of what the network says, in units of the log-likelihood.
-const WEIGHT: f32 = 0.8;
+const WEIGHT: f32 = 3.5;
 
 /// What the network says, as evidence for a cut.
 pub(crate) fn evidence(odds: &[f32]) -> Vec<f32> {

@@ -1,14 +1,12 @@
-//! The layers of a convolutional network, on the processor: planes of numbers, convolutions of 3 x 3, alone or
-//! in residual blocks, and changes of size by two.
+//! The layers of a convolutional network, on the processor: planes of numbers, convolutions, alone or in blocks, and
+//! changes of size by two.
 
 #[cfg(not(target_family = "wasm"))]
-use pulp::Arch;
+use pulp::{Arch, NullaryFnOnce};
 
 /// So many output channels and columns are computed together.
 const CHANNELS: usize = 4;
 const COLUMNS: usize = 16;
-/// A convolution sees so many columns and rows.
-const KERNEL: usize = 3;
 
 /// Planes of numbers of one size, one after another.
 #[derive(Debug, Clone)]
@@ -39,6 +37,13 @@ impl Planes {
     /// These planes, then `others` of the same size.
     pub(super) fn followed_by(mut self, others: &Self) -> Self {
         self.values.extend(&others.values);
+        self
+    }
+
+    fn plus(mut self, others: &Self) -> Self {
+        for (value, other) in self.values.iter_mut().zip(&others.values) {
+            *value += other;
+        }
         self
     }
 
@@ -73,14 +78,24 @@ impl Planes {
         }
     }
 
+    /// Every second column, from the second on.
+    fn every_second_column(&self) -> Self {
+        let values = self.values.chunks_exact(2).map(|pair| pair[1]);
+        Self {
+            values: values.collect(),
+            width: self.width / 2,
+            height: self.height,
+        }
+    }
+
     /// With a margin of zeros, wide enough on the right for whole groups of columns.
-    fn padded(&self) -> Self {
-        let width = self.width.next_multiple_of(COLUMNS) + KERNEL - 1;
-        let mut padded = Self::zeros(self.channels(), (width, self.height + KERNEL - 1));
+    fn padded(&self, margin: usize) -> Self {
+        let width = self.width.next_multiple_of(COLUMNS) + 2 * margin;
+        let mut padded = Self::zeros(self.channels(), (width, self.height + 2 * margin));
         let area = padded.area();
         for (channel, plane) in self.values.chunks_exact(self.area().max(1)).enumerate() {
             for (y, row) in plane.chunks_exact(self.width).enumerate() {
-                let begin = channel * area + (y + 1) * width + 1;
+                let begin = channel * area + (y + margin) * width + margin;
                 padded.values[begin..begin + self.width].copy_from_slice(row);
             }
         }
@@ -88,20 +103,87 @@ impl Planes {
     }
 }
 
-/// A convolution of 3 x 3 with zeros around the planes.
+/// What happens to the results of a layer.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Activation {
+    None,
+    /// Negative ones become zero.
+    Relu,
+    /// And those above six become six.
+    Relu6,
+}
+
+impl Activation {
+    #[inline(always)]
+    fn apply(self, value: f32) -> f32 {
+        match self {
+            Self::None => value,
+            Self::Relu => value.max(0.0),
+            Self::Relu6 => value.clamp(0.0, 6.0),
+        }
+    }
+}
+
+/// A layer that computes rows from planes with a margin.
+trait Filling {
+    /// Fills a result with every `step`th row.
+    fn fill(&self, padded: &Planes, step: usize, result: &mut Planes);
+}
+
+/// Fills a result with every `step`th row, by the instructions that the processor has.
+fn filled(layer: &impl Filling, padded: &Planes, step: usize, result: &mut Planes) {
+    // `Arch` would add a version for relaxed SIMD, which not every browser has.
+    #[cfg(target_family = "wasm")]
+    layer.fill(padded, step, result);
+    #[cfg(not(target_family = "wasm"))]
+    Arch::new().dispatch(Task {
+        layer,
+        padded,
+        step,
+        result,
+    });
+}
+
+/// Not a closure, because these are not always inlined, and only what is gets the processor's instructions.
+#[cfg(not(target_family = "wasm"))]
+struct Task<'a, L> {
+    layer: &'a L,
+    padded: &'a Planes,
+    step: usize,
+    result: &'a mut Planes,
+}
+
+#[cfg(not(target_family = "wasm"))]
+impl<L: Filling> NullaryFnOnce for Task<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.layer.fill(self.padded, self.step, self.result);
+    }
+}
+
+/// A convolution with zeros around the planes.
 #[derive(Debug)]
 pub(super) struct Convolution {
     /// By groups of output channels: for each input channel, row and column, one weight a channel.
     weights: Vec<[f32; CHANNELS]>,
     biases: Vec<f32>,
     inputs: usize,
-    /// Whether negative results become zero.
-    is_rectified: bool,
+    /// It sees so many columns and rows, 1 or 3.
+    side: usize,
+    activation: Activation,
 }
 
 impl Convolution {
-    /// `weights` in the order output channel, input channel, row, column; one of `biases` an output channel.
-    pub(super) fn new(weights: &[f32], biases: Vec<f32>, is_rectified: bool) -> Self {
+    /// `weights` in the order output channel, input channel, row, column; `side` rows and columns, 1 or 3; one of `biases`
+    /// an output channel.
+    pub(super) fn new(
+        weights: &[f32],
+        biases: Vec<f32>,
+        side: usize,
+        activation: Activation,
+    ) -> Self {
         let outputs = biases.len();
         let each = weights.len() / outputs.max(1);
         let groups = (0..outputs).step_by(CHANNELS);
@@ -116,40 +198,46 @@ impl Convolution {
         Self {
             weights: grouped.collect(),
             biases,
-            inputs: each / (KERNEL * KERNEL),
-            is_rectified,
+            inputs: each / (side * side).max(1),
+            side,
+            activation,
         }
     }
 
     /// The result for planes of as many channels as the layer has inputs.
     pub(super) fn apply(&self, planes: &Planes) -> Planes {
-        let mut result = Planes::zeros(self.biases.len(), (planes.width, planes.height));
-        let padded = planes.padded();
-        // `Arch` would add a version for relaxed SIMD, which not every browser has.
-        #[cfg(target_family = "wasm")]
-        self.fill(&padded, &mut result);
-        #[cfg(not(target_family = "wasm"))]
-        Arch::new().dispatch(|| self.fill(&padded, &mut result));
+        self.rows(planes, 1)
+    }
+
+    /// Every `step`th row of the result.
+    fn rows(&self, planes: &Planes, step: usize) -> Planes {
+        let mut result = Planes::zeros(self.biases.len(), (planes.width, planes.height / step));
+        let padded = planes.padded(self.side / 2);
+        filled(self, &padded, step, &mut result);
         result
     }
 
     #[inline(always)]
-    fn fill(&self, padded: &Planes, result: &mut Planes) {
-        let each = self.inputs * KERNEL * KERNEL;
+    fn fill_by<const SIDE: usize, const AREA: usize, const SEEN: usize>(
+        &self,
+        padded: &Planes,
+        step: usize,
+        result: &mut Planes,
+    ) {
+        let each = self.inputs * AREA;
         let (width, area) = (result.width, result.area());
         for y in 0..result.height {
             for (group, weights) in self.weights.chunks_exact(each.max(1)).enumerate() {
                 let first = group * CHANNELS;
                 for x in (0..width).step_by(COLUMNS) {
-                    let sums = sums(weights, padded, x, y);
+                    let sums = sums::<SIDE, AREA, SEEN>(weights, padded, x, (y + 1) * step - 1);
                     let many = COLUMNS.min(width - x);
                     let biases = self.biases[first..].iter();
                     for (channel, (sums, bias)) in sums.iter().zip(biases).enumerate() {
                         let begin = (first + channel) * area + y * width + x;
                         let values = &mut result.values[begin..begin + many];
                         for (value, sum) in values.iter_mut().zip(sums) {
-                            let sum = sum + bias;
-                            *value = if self.is_rectified { sum.max(0.0) } else { sum };
+                            *value = self.activation.apply(sum + bias);
                         }
                     }
                 }
@@ -158,32 +246,135 @@ impl Convolution {
     }
 }
 
-/// A step from planes to others of the same size. A plain one may change their number.
+impl Filling for Convolution {
+    #[inline(always)]
+    fn fill(&self, padded: &Planes, step: usize, result: &mut Planes) {
+        if self.side == 1 {
+            self.fill_by::<1, 1, COLUMNS>(padded, step, result);
+        } else {
+            self.fill_by::<3, 9, { COLUMNS + 2 }>(padded, step, result);
+        }
+    }
+}
+
+/// A convolution of each channel for itself, with zeros around the planes.
+#[derive(Debug)]
+pub(super) struct Depthwise {
+    /// For each channel, row and column.
+    weights: Vec<f32>,
+    biases: Vec<f32>,
+    /// It sees so many columns and rows, an odd number.
+    side: usize,
+    /// Whether only every second column and row is wanted, from the second on.
+    halves: bool,
+}
+
+impl Depthwise {
+    /// `weights` in the order channel, row, column; one of `biases` a channel.
+    pub(super) fn new(weights: Vec<f32>, biases: Vec<f32>, side: usize, halves: bool) -> Self {
+        Self {
+            weights,
+            biases,
+            side,
+            halves,
+        }
+    }
+
+    /// The result, 0..=6, for planes of as many channels.
+    fn apply(&self, planes: &Planes) -> Planes {
+        let padded = planes.padded(self.side / 2);
+        let step = 1 + usize::from(self.halves);
+        let mut result = Planes::zeros(self.biases.len(), (planes.width, planes.height / step));
+        filled(self, &padded, step, &mut result);
+        if self.halves {
+            result.every_second_column()
+        } else {
+            result
+        }
+    }
+}
+
+impl Filling for Depthwise {
+    #[inline(always)]
+    fn fill(&self, padded: &Planes, step: usize, result: &mut Planes) {
+        let (side, width, area) = (self.side, result.width.max(1), result.area().max(1));
+        let kernels = self.weights.chunks_exact((side * side).max(1));
+        let planes = padded.values.chunks_exact(padded.area().max(1));
+        let results = result.values.chunks_exact_mut(area);
+        for ((plane, result), (kernel, bias)) in planes.zip(results).zip(kernels.zip(&self.biases))
+        {
+            for (y, row) in result.chunks_exact_mut(width).enumerate() {
+                row.fill(*bias);
+                let rows = plane.chunks_exact(padded.width).skip((y + 1) * step - 1);
+                for (seen, weights) in rows.zip(kernel.chunks_exact(side.max(1))) {
+                    for (column, weight) in weights.iter().enumerate() {
+                        for (sum, value) in row.iter_mut().zip(&seen[column..]) {
+                            *sum += weight * value;
+                        }
+                    }
+                }
+                for value in row {
+                    *value = Activation::Relu6.apply(*value);
+                }
+            }
+        }
+    }
+}
+
+/// Many channels for a while, each of which a convolution sees for itself (Sandler et al., "MobileNetV2", 2018).
+#[derive(Debug)]
+pub(super) struct Bottleneck {
+    pub(super) expand: Option<Convolution>,
+    pub(super) depthwise: Depthwise,
+    pub(super) project: Convolution,
+}
+
+impl Bottleneck {
+    fn apply(&self, planes: Planes) -> Planes {
+        let wide = self.expand.as_ref().map(|expand| expand.apply(&planes));
+        let wide = self.depthwise.apply(wide.as_ref().unwrap_or(&planes));
+        let result = self.project.apply(&wide);
+        if self.depthwise.halves || result.channels() != planes.channels() {
+            return result;
+        }
+        result.plus(&planes)
+    }
+}
+
+/// A step from planes to others.
 #[derive(Debug)]
 pub(super) enum Layer {
     Plain(Convolution),
+    /// Of the result every second column and row is kept, from the second on.
+    Halving(Convolution),
     /// What the convolutions make of the planes is added to them.
     Residual([Convolution; 2]),
+    Bottleneck(Bottleneck),
 }
 
 impl Layer {
     pub(super) fn apply(&self, planes: Planes) -> Planes {
         match self {
             Self::Plain(convolution) => convolution.apply(&planes),
-            Self::Residual([first, second]) => {
-                let mut sum = second.apply(&first.apply(&planes));
-                for (sum, value) in sum.values.iter_mut().zip(&planes.values) {
-                    *sum += value;
-                }
-                sum
-            }
+            Self::Halving(convolution) => convolution.rows(&planes, 2).every_second_column(),
+            Self::Residual([first, second]) => second.apply(&first.apply(&planes)).plus(&planes),
+            Self::Bottleneck(bottleneck) => bottleneck.apply(planes),
+        }
+    }
+
+    /// Whether the result has half the size.
+    pub(super) fn halves(&self) -> bool {
+        match self {
+            Self::Plain(_) | Self::Residual(_) => false,
+            Self::Halving(_) => true,
+            Self::Bottleneck(bottleneck) => bottleneck.depthwise.halves,
         }
     }
 }
 
 /// The weighted sums of a group of channels for a group of columns from `x` on.
 #[inline(always)]
-fn sums(
+fn sums<const SIDE: usize, const AREA: usize, const SEEN: usize>(
     weights: &[[f32; CHANNELS]],
     padded: &Planes,
     x: usize,
@@ -191,11 +382,11 @@ fn sums(
 ) -> [[f32; COLUMNS]; CHANNELS] {
     let mut sums = [[0.0_f32; COLUMNS]; CHANNELS];
     let planes = padded.values.chunks_exact(padded.area());
-    let kernels = weights.as_chunks::<{ KERNEL * KERNEL }>().0;
+    let kernels = weights.as_chunks::<AREA>().0;
     for (plane, kernel) in planes.zip(kernels) {
-        for (row, kernel) in kernel.as_chunks::<KERNEL>().0.iter().enumerate() {
+        for (row, kernel) in kernel.as_chunks::<SIDE>().0.iter().enumerate() {
             let begin = (y + row) * padded.width + x;
-            let Some(values) = plane[begin..].first_chunk::<{ COLUMNS + KERNEL - 1 }>() else {
+            let Some(values) = plane[begin..].first_chunk::<SEEN>() else {
                 continue;
             };
             for (column, weights) in kernel.iter().enumerate() {
@@ -231,7 +422,7 @@ mod tests {
         };
         let weights = numbers(outputs * inputs * 9);
         let biases = numbers(outputs);
-        let result = Convolution::new(&weights, biases.clone(), false).apply(&planes);
+        let result = Convolution::new(&weights, biases.clone(), 3, Activation::None).apply(&planes);
         assert_eq!((result.channels(), result.width), (outputs, width));
         let value = |channel: usize, x: isize, y: isize| {
             let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
@@ -269,10 +460,13 @@ mod tests {
             width: 20,
             height: 4,
         };
-        let convolution = |bias: f32, is_rectified| {
-            Convolution::new(&[0.0; 3 * 3 * 9], vec![bias; 3], is_rectified)
+        let convolution = |bias: f32, activation| {
+            Convolution::new(&[0.0; 3 * 3 * 9], vec![bias; 3], 3, activation)
         };
-        let layer = Layer::Residual([convolution(1.0, true), convolution(-0.5, false)]);
+        let layer = Layer::Residual([
+            convolution(1.0, Activation::Relu),
+            convolution(-0.5, Activation::None),
+        ]);
         let result = layer.apply(planes.clone());
         let mut pairs = result.values.iter().zip(&planes.values);
         assert!(pairs.all(|(found, value)| (found - (value - 0.5)).abs() < 1e-6));
@@ -292,5 +486,80 @@ mod tests {
         let again = half.doubled();
         assert_eq!(again.values[4], half.values[0]);
         assert_eq!(again.values[8], half.values[2]);
+    }
+
+    #[test]
+    fn a_depthwise_convolution_sees_each_channel_for_itself() {
+        let planes = Planes {
+            values: numbers(2 * 6 * 4),
+            width: 6,
+            height: 4,
+        };
+        let (weights, biases) = (numbers(2 * 9), vec![3.0, -0.1]);
+        // The same as a convolution whose other weights are zero.
+        let zeros = [0.0; 9];
+        let all = [&weights[..9], &zeros, &zeros, &weights[9..]].concat();
+        let whole = Convolution::new(&all, biases.clone(), 3, Activation::Relu6).apply(&planes);
+        // Of six columns and four rows.
+        let odd = [7, 9, 11, 19, 21, 23];
+        let half = Planes {
+            values: [0, 24]
+                .iter()
+                .flat_map(|plane| odd.map(|at| whole.values[plane + at]))
+                .collect(),
+            width: 3,
+            height: 2,
+        };
+        for (halves, wanted) in [(false, whole), (true, half)] {
+            let layer = Depthwise::new(weights.clone(), biases.clone(), 3, halves);
+            let found = layer.apply(&planes);
+            assert_eq!((found.width, found.height), (wanted.width, wanted.height));
+            let mut pairs = found.values.iter().zip(&wanted.values);
+            assert!(pairs.all(|(found, wanted)| (found - wanted).abs() < 1e-5));
+        }
+    }
+
+    #[test]
+    fn a_wide_depthwise_convolution_sees_two_pixels_on_each_side() {
+        let ones = Planes {
+            values: vec![1.0; 35],
+            width: 7,
+            height: 5,
+        };
+        let layer = Depthwise::new(vec![0.1; 25], vec![0.0], 5, false);
+        let found = layer.apply(&ones);
+        for (at, count) in [(0, 9.0), (3, 15.0), (17, 25.0), (34, 9.0)] {
+            assert!((found.values[at] - 0.1 * count).abs() < 1e-5, "{at}");
+        }
+    }
+
+    #[test]
+    fn a_bottleneck_adds_to_its_planes_unless_it_halves_them() {
+        let planes = Planes {
+            values: numbers(2 * 4 * 4),
+            width: 4,
+            height: 4,
+        };
+        let bottleneck = |halves| Bottleneck {
+            expand: Some(Convolution::new(
+                &[0.0; 4],
+                vec![9.0; 2],
+                1,
+                Activation::Relu6,
+            )),
+            depthwise: Depthwise::new(
+                [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]; 2].concat(),
+                vec![0.0; 2],
+                3,
+                halves,
+            ),
+            project: Convolution::new(&[1.0, 0.0, 0.0, 0.5], vec![0.0; 2], 1, Activation::None),
+        };
+        let sum = Layer::Bottleneck(bottleneck(false)).apply(planes.clone());
+        assert!((sum.values[0] - planes.values[0] - 6.0).abs() < 1e-6);
+        assert!((sum.values[31] - planes.values[31] - 3.0).abs() < 1e-6);
+        let layer = Layer::Bottleneck(bottleneck(true));
+        assert!(layer.halves());
+        assert_eq!(layer.apply(planes).values, [[6.0; 4], [3.0; 4]].concat());
     }
 }

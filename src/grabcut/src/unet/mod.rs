@@ -1,5 +1,6 @@
 //! A small U-Net, on the processor: an encoder and a decoder with connections between layers of the same size
-//! (Ronneberger, Fischer and Brox, "U-Net", 2015), with residual blocks (He et al., "Deep residual learning", 2016).
+//! (Ronneberger, Fischer and Brox, "U-Net", 2015), with residual blocks (He et al., "Deep residual learning", 2016) or
+//! bottlenecks.
 
 mod layers;
 
@@ -7,7 +8,7 @@ use half::f16;
 use safetensors::{Dtype, SafeTensors};
 
 pub(crate) use layers::Planes;
-use layers::{Convolution, Layer};
+use layers::{Activation, Bottleneck, Convolution, Depthwise, Layer};
 
 /// The encoder halves the planes so many times.
 pub(crate) const LEVELS: usize = 5;
@@ -51,7 +52,7 @@ impl Network {
                 _ => None,
             }
         };
-        let layer = |name: &str, is_rectified: bool| {
+        let scaled = |name: &str| {
             let mut weights = numbers(&format!("{name}.weight"))?;
             let biases = numbers(&format!("{name}.bias"))?;
             if let Some(scales) = numbers(&format!("{name}.scale")) {
@@ -60,20 +61,44 @@ impl Network {
                     weights.iter_mut().for_each(|weight| *weight *= scale);
                 }
             }
-            Some(Convolution::new(&weights, biases, is_rectified))
+            let shape = tensors.tensor(&format!("{name}.weight")).ok()?;
+            Some((weights, biases, *shape.shape().last()?))
         };
-        let plain_or_residual = |name: &str| {
-            if let Some(plain) = layer(name, true) {
+        let convolution = |name: &str, activation: Activation| {
+            let (weights, biases, side) = scaled(name).filter(|of| matches!(of.2, 1 | 3))?;
+            Some(Convolution::new(&weights, biases, side, activation))
+        };
+        let bottleneck = |name: &str| {
+            let part = |part: &str| format!("{name}.{part}");
+            let project = convolution(&part("project"), Activation::None)?;
+            let halving = scaled(&part("halving"));
+            let halves = halving.is_some();
+            let (weights, biases, side) = halving.or_else(|| scaled(&part("depthwise")))?;
+            Some(Bottleneck {
+                expand: convolution(&part("expand"), Activation::Relu6),
+                depthwise: Depthwise::new(weights, biases, side, halves),
+                project,
+            })
+        };
+        // Its kind follows from the names of its parts.
+        let layer = |name: &str| {
+            if let Some(plain) = convolution(name, Activation::Relu) {
                 return Some(Layer::Plain(plain));
             }
-            let first = layer(&format!("{name}.layers.0"), true)?;
-            let second = layer(&format!("{name}.layers.1"), false)?;
+            if let Some(bottleneck) = bottleneck(name) {
+                return Some(Layer::Bottleneck(bottleneck));
+            }
+            if let Some(halving) = convolution(&format!("{name}.halving"), Activation::Relu6) {
+                return Some(Layer::Halving(halving));
+            }
+            let first = convolution(&format!("{name}.layers.0"), Activation::Relu)?;
+            let second = convolution(&format!("{name}.layers.1"), Activation::None)?;
             Some(Layer::Residual([first, second]))
         };
         // The layers of a size: as many as there are.
         let layers = |part: &str, level: usize| -> Vec<Layer> {
             (0..)
-                .map_while(|number| plain_or_residual(&format!("{part}.{level}.{number}")))
+                .map_while(|number| layer(&format!("{part}.{level}.{number}")))
                 .collect()
         };
         Some(Self {
@@ -81,8 +106,11 @@ impl Network {
             decoder: (0..LEVELS - 1)
                 .map(|level| layers("decoder", level))
                 .collect(),
-            narrow: layer("narrow", true)?,
-            head: [layer("head.0", true)?, layer("head.1", false)?],
+            narrow: convolution("narrow", Activation::Relu)?,
+            head: [
+                convolution("head.0", Activation::Relu)?,
+                convolution("head.1", Activation::None)?,
+            ],
         })
     }
 
@@ -96,7 +124,11 @@ impl Network {
         let mut sizes = vec![seen];
         for layers in &self.encoder {
             if let Some(larger) = sizes.last() {
-                sizes.push(through(larger.halved(), layers));
+                let planes = match layers.first() {
+                    Some(first) if first.halves() => larger.clone(),
+                    _ => larger.halved(),
+                };
+                sizes.push(through(planes, layers));
             }
         }
         let mut planes = sizes.pop().unwrap_or_else(|| Planes::zeros(0, (0, 0)));
