@@ -321,7 +321,7 @@ impl Filling for Depthwise {
     }
 }
 
-/// Many channels for a while, each of which a convolution sees for itself (Sandler et al., "MobileNetV2", 2018).
+/// Many channels for a while, and a convolution that sees each for itself (Sandler et al., "MobileNetV2", 2018).
 #[derive(Debug)]
 pub(super) struct Bottleneck {
     pub(super) expand: Option<Convolution>,
