@@ -249,7 +249,8 @@ fn cut_by_hints(
     let known = pyramid.coarsest().labels.clone();
     let odds = by_hints::odds(&pyramid, rect);
     let start = by_hints::start(&known, first, &odds);
-    let mut pyramid = pyramid.with_evidence(by_hints::evidence(&odds));
+    let has_marks = hints.seeds.is_some() || !hints.strokes.is_empty();
+    let mut pyramid = pyramid.with_evidence(by_hints::evidence(&odds, has_marks));
     let near = rect.map(surroundings);
     let mut cut = match pyramid.cut(start, first, near) {
         // Where the network says nothing, or that there is nothing else, the colours decide.

@@ -9,10 +9,17 @@ pub(crate) use odds::odds;
 
 /// Weight of what the network says, in units of the log-likelihood.
 const WEIGHT: f32 = 3.5;
+/// And where there are marks, which may correct it.
+const WEIGHT_BESIDE_MARKS: f32 = 1.5;
 
 /// What the network says, as evidence for a cut.
-pub(crate) fn evidence(odds: &[f32]) -> Vec<f32> {
-    odds.iter().map(|odds| WEIGHT * odds).collect()
+pub(crate) fn evidence(odds: &[f32], has_marks: bool) -> Vec<f32> {
+    let weight = if has_marks {
+        WEIGHT_BESIDE_MARKS
+    } else {
+        WEIGHT
+    };
+    odds.iter().map(|odds| weight * odds).collect()
 }
 
 /// The labels with which a cut starts: open pixels are what the network says, if it says that some are object and if the
