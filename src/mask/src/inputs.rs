@@ -81,6 +81,9 @@ impl MaskInputs {
     }
 
     fn search(&mut self, input: &Path, target: Option<&MaskTarget>) -> Result<(), SessionError> {
+        if !input.exists() {
+            return Err(unusable(input, "does not exist"));
+        }
         let into_folder = match target {
             Some(MaskTarget::Folder(folder)) => Some(folder.as_path()),
             _ => None,
@@ -93,8 +96,10 @@ impl MaskInputs {
         let (inside, beside) = match inside {
             Ok(inside) if inside == [input] => (inside, Vec::new()),
             Ok(inside) => (inside, beside_recordings(input)?),
-            Err(error) => match photographs(input)? {
-                (photographs, _) if photographs.is_empty() => return Err(error),
+            Err(_) => match photographs(input)? {
+                (photographs, _) if photographs.is_empty() => {
+                    return Err(unusable(input, "has nothing to mask"));
+                }
                 found => found,
             },
         };
@@ -139,6 +144,13 @@ impl MaskInputs {
         }
         Ok(Some(files))
     }
+}
+
+fn unusable(input: &Path, why: &str) -> SessionError {
+    SessionError::Unusable(format!(
+        "{} {why}: give a session folder, a video, a photograph, or a folder of them",
+        input.display()
+    ))
 }
 
 /// The photographs in a folder that is not a session, sorted by name, and the other files next to them. Masks that were made

@@ -5,7 +5,7 @@ use std::fs;
 use image::RgbImage;
 use relit_data::still::Colour;
 use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
-use relit_video::Video;
+use relit_video::{Video, VideoError};
 
 use super::request::TurnRequest;
 use super::{MaskingError, SourceFrame};
@@ -57,7 +57,7 @@ pub(super) fn read_frame(
     video: &Video,
     number: u64,
 ) -> Result<(RgbImage, SourceFrame), MaskingError> {
-    let mut frame = video.frame(number)?;
+    let mut frame = decoded(video, number)?;
     to_srgb(video, &mut frame)?;
     let info = video.frames().iter().find(|info| info.number == number);
     let name = video.path().file_name().unwrap_or_default();
@@ -74,9 +74,20 @@ pub(super) fn read_frame(
     Ok((frame, source))
 }
 
+/// Decodes a frame; whoever has a photograph is not told of frames.
+fn decoded(video: &Video, number: u64) -> Result<RgbImage, MaskingError> {
+    video.frame(number).map_err(|error| match error {
+        VideoError::Frame { path, fault, .. } if is_photograph(video) => {
+            let why = format!("{fault}; save it anew, as PNG or JPEG, or take another");
+            MaskingError::unusable("photograph", path, &why)
+        }
+        error => error.into(),
+    })
+}
+
 /// Turns a photograph into sRGB, whose file says that its colours are others.
 fn to_srgb(video: &Video, frame: &mut RgbImage) -> Result<(), MaskingError> {
-    if video.frames().len() != 1 {
+    if !is_photograph(video) {
         return Ok(());
     }
     let path = video.path();
@@ -92,4 +103,25 @@ fn to_srgb(video: &Video, frame: &mut RgbImage) -> Result<(), MaskingError> {
 /// Whether two frames have the same pixels.
 pub(super) fn same_image(a: &SourceFrame, b: &SourceFrame) -> bool {
     (a.width, a.height, &a.frame_blake3) == (b.width, b.height, &b.frame_blake3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_damaged_photograph_is_refused_as_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cup.jpg");
+        let picture = RgbImage::from_fn(64, 48, |x, y| image::Rgb([x as u8, y as u8, 90]));
+        picture.save(&path).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let read = Video::open(&path).map(|video| read_frame(&video, 0));
+        let what = match read {
+            Ok(Err(MaskingError::Unusable { what, .. })) => what,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(what, "photograph");
+    }
 }
