@@ -11,74 +11,19 @@ what it takes to light the photographs of such a step, and to cast a view.
 
 import argparse
 import json
+import pathlib
 import statistics
 import subprocess
+import sys
 import time
 
 import torch
 from torch import nn
-from torch.nn import functional
 
-INPUTS, OUTPUTS, BLOCK, GROUP = 7, 9, 2, 16
-ENCODER = (32, 64, 128, 256, 256)
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "relight/photo/tests/fixtures/nets"))
+from make import Decomposer
 
-
-class Layer(nn.Module):
-    def __init__(self, inputs, outputs, stride=1, rectified=True):
-        super().__init__()
-        self.convolution = nn.Conv2d(inputs, outputs, 3, stride, 1)
-        self.norm = nn.GroupNorm(outputs // GROUP, outputs)
-        self.rectified = rectified
-
-    def forward(self, value):
-        value = self.norm(self.convolution(value))
-        return functional.relu(value) if self.rectified else value
-
-
-class Residual(nn.Module):
-    def __init__(self, channels):
-        super().__init__()
-        self.layers = nn.Sequential(
-            Layer(channels, channels), Layer(channels, channels, rectified=False)
-        )
-
-    def forward(self, value):
-        return functional.relu(value + self.layers(value))
-
-
-class Decomposer(nn.Module):
-    def __init__(self):
-        super().__init__()
-        inputs = INPUTS * BLOCK * BLOCK
-        self.encoder = nn.ModuleList()
-        for step, outputs in enumerate(ENCODER):
-            layers = [Layer(inputs, outputs, 1 if step == 0 else 2)]
-            if step >= 2:
-                layers.append(Residual(outputs))
-            self.encoder.append(nn.Sequential(*layers))
-            inputs = outputs
-        self.middle = nn.Sequential(Residual(inputs), Residual(inputs))
-        self.decoder = nn.ModuleList()
-        for outputs, skip in zip(ENCODER[-2::-1], ENCODER[:0:-1]):
-            self.decoder.append(Layer(inputs + skip, outputs))
-            inputs = outputs
-        self.head = nn.Sequential(
-            Layer(2 * ENCODER[0], ENCODER[0]),
-            nn.Conv2d(ENCODER[0], OUTPUTS * BLOCK * BLOCK, 3, 1, 1),
-        )
-
-    def forward(self, value):
-        value = functional.pixel_unshuffle(value, BLOCK)
-        features = []
-        for step in self.encoder:
-            value = step(value)
-            features.append(value)
-        value = self.middle(value)
-        for step in self.decoder:
-            value = step(torch.cat([value, features.pop()], 1))
-            value = functional.interpolate(value, scale_factor=2, mode="bilinear")
-        value = self.head(torch.cat([value, features.pop()], 1))
-        return functional.pixel_shuffle(value, BLOCK)
+INPUTS = 7
 
 
 def least(steps, call):
