@@ -78,7 +78,7 @@ pub(super) fn read_frame(
 fn decoded(video: &Video, number: u64) -> Result<RgbImage, MaskingError> {
     video.frame(number).map_err(|error| match error {
         VideoError::Frame { path, fault, .. } if is_photograph(video) => {
-            let why = format!("{fault}; save it anew, as PNG or JPEG, or take another");
+            let why = format!("{fault}; save it again as PNG or JPEG, or take another");
             MaskingError::unusable("photograph", path, &why)
         }
         error => error.into(),
