@@ -81,9 +81,6 @@ impl MaskInputs {
     }
 
     fn search(&mut self, input: &Path, target: Option<&MaskTarget>) -> Result<(), SessionError> {
-        if !input.exists() {
-            return Err(unusable(input, "does not exist"));
-        }
         let into_folder = match target {
             Some(MaskTarget::Folder(folder)) => Some(folder.as_path()),
             _ => None,
@@ -97,9 +94,7 @@ impl MaskInputs {
             Ok(inside) if inside == [input] => (inside, Vec::new()),
             Ok(inside) => (inside, beside_recordings(input)?),
             Err(_) => match photographs(input)? {
-                (photographs, _) if photographs.is_empty() => {
-                    return Err(unusable(input, "has nothing to mask"));
-                }
+                (photographs, _) if photographs.is_empty() => return Err(nothing_to_mask(input)),
                 found => found,
             },
         };
@@ -146,7 +141,12 @@ impl MaskInputs {
     }
 }
 
-fn unusable(input: &Path, why: &str) -> SessionError {
+fn nothing_to_mask(input: &Path) -> SessionError {
+    let why = if input.exists() {
+        "has nothing to mask"
+    } else {
+        "does not exist"
+    };
     SessionError::Unusable(format!(
         "{} {why}: give a session folder, a video, a photograph, or a folder of them",
         input.display()

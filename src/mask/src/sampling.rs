@@ -3,7 +3,7 @@
 use std::fs;
 
 use image::RgbImage;
-use relit_data::still::Colour;
+use relit_data::still::{Colour, is_named};
 use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
 use relit_video::{Video, VideoError};
 
@@ -77,7 +77,7 @@ pub(super) fn read_frame(
 /// Decodes a frame; whoever has a photograph is not told of frames.
 fn decoded(video: &Video, number: u64) -> Result<RgbImage, MaskingError> {
     video.frame(number).map_err(|error| match error {
-        VideoError::Frame { path, fault, .. } if is_photograph(video) => {
+        VideoError::Frame { path, fault, .. } if is_named(&path) => {
             let why = format!("{fault}; save it again as PNG or JPEG, or take another");
             MaskingError::unusable("photograph", path, &why)
         }
