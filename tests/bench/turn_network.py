@@ -1,6 +1,6 @@
 """The network that tells object, table and room in a turn (src/grabcut/src/turn/network): its data and its training.
 
-    python turn_network.py make MESHES PANORAMAS DATA --views 560 --drawings 1700
+    python turn_network.py make MESHES PANORAMAS DATA
     python turn_network.py train DATA --minutes 180 -o src/grabcut/src/turn/network/weights.safetensors
 
 With the packages of requirements-network.txt. Half of the turns are flat drawings: shapes that no mesh has, rooms of
@@ -9,22 +9,22 @@ than its `make` takes. DATA/train and DATA/validation get one file a turn: the o
 and object, as 16-bit numbers.
 """
 
-import argparse
 import math
-import pathlib
 
 import cv2
 import numpy as np
 import torch
 from torch.nn import functional
 
+import efficientnet
 import turns
 import unet
 
 SIZES = [(320, 240), (320, 240), (320, 180)]
 LOW = 192
 FRAMES = [32, 32, 32, 16, 12, 8]
-SHOTS = 3
+# Turns of each view, and drawings beside them.
+SHOTS, DRAWINGS = 3, 3
 # As src/grabcut/src/turn/network/observations.rs describes them.
 PLANES, EDGE, DARK, WHITE = 18, 0.05, 0.02, 250
 MIRRORED_STEPS, WAVES = (14, 16), ((1, 7), (2, 9))
@@ -231,7 +231,7 @@ def make(arguments):
             for shot in range(SHOTS):
                 frames = list(turns.pictures(view, None, rooms[rng.integers(len(rooms))], max(FRAMES), rng))
                 save(folder / f"{number:05}-{shot}.npy", frames, view.cover, rng)
-        for number in range(arguments.seed, arguments.seed + (0 if held_out else arguments.drawings)):
+        for number in range(arguments.seed, arguments.seed + (0 if held_out else DRAWINGS * arguments.views)):
             rng = np.random.default_rng([number, 77])
             try:
                 frames, cover = drawn_turn(SIZES[rng.integers(len(SIZES))], rooms, max(FRAMES), rng)
@@ -307,7 +307,7 @@ def batches(folder, rng):
             begin = int(rng.integers(0, seen.shape[3] - wide + 1) * 0.5 + (seen.shape[3] - wide) * 0.25)
             seen, shares = (planes[..., begin : begin + wide] for planes in (seen, shares))
         # Some smaller, as small frames are.
-        by = rng.choice([1, 2, 4], p=[0.82, 0.13, 0.05])
+        by = rng.choice([1, 2, 4], p=[0.78, 0.14, 0.08])
         if by > 1:
             low = LOW // by // 32 * 32 * by
             wide = seen.shape[3] // by // 32 * 32 * by
@@ -315,17 +315,22 @@ def batches(folder, rng):
         yield seen, shares
 
 
+def network_of():
+    return unet.Network(PLANES, CLASSES, efficientnet.encoder(PLANES + 2), efficientnet.SKIPS)
+
+
 def train(arguments):
     validation = sorted((arguments.data / "validation").glob("*.npy"))
     overlap = lambda network: turns.mean(overlaps(network, validation))
     torch.manual_seed(0)
-    network, mean = (unet.Network(PLANES, CLASSES) for _ in range(2))
+    network, mean = (network_of() for _ in range(2))
+    efficientnet.take(network.encoder)
     unet.fit(network, mean, batches(arguments.data / "train", np.random.default_rng(0)), loss, overlap, arguments)
 
 
 def parity(arguments):
     """Logits of a pattern that moves, for the test of src/grabcut/src/turn/network/mod.rs."""
-    network = unet.read(unet.Network(PLANES, CLASSES), arguments.weights)
+    network = unet.read(network_of(), arguments.weights)
     down, across = np.mgrid[0:72, 0:96]
     level = lambda turn, channel: (3 * across + down * (5 + channel) + turn * (across // 8 + 1) * (11 + channel) + across * down // 7) % 256
     frames = np.stack([np.stack([level(turn, channel) for channel in (2, 1, 0)], -1) for turn in range(8)]).astype(np.uint8)
@@ -338,25 +343,5 @@ def parity(arguments):
             print(what, number, *(f"{plane[y, x]:.5f}" for x, y in ((7, 5), (50, 33), (95, 71))))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    verbs = parser.add_subparsers(required=True)
-    making = verbs.add_parser("make")
-    for name in ("meshes", "panoramas", "data"):
-        making.add_argument(name, type=pathlib.Path)
-    making.add_argument("--views", type=int, default=560)
-    making.add_argument("--drawings", type=int, default=1700)
-    making.add_argument("--seed", type=int, default=0)
-    making.set_defaults(run=make)
-    training = verbs.add_parser("train")
-    unet.add_training(training)
-    training.set_defaults(run=train)
-    comparing = verbs.add_parser("parity")
-    comparing.add_argument("weights", type=pathlib.Path)
-    comparing.set_defaults(run=parity)
-    arguments = parser.parse_args()
-    arguments.run(arguments)
-
-
 if __name__ == "__main__":
-    main()
+    unet.command_line(__doc__, make, train, parity, views=560)

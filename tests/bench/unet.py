@@ -1,5 +1,6 @@
 """The small U-Net of relit-mask (src/grabcut/src/unet): its layers, its training, and the file of its weights."""
 
+import argparse
 import concurrent.futures
 import json
 import math
@@ -215,10 +216,26 @@ def read(network, path):
     return network.eval()
 
 
-def add_training(parser):
-    """The arguments of `fit`."""
-    parser.add_argument("data", type=pathlib.Path)
-    parser.add_argument("--minutes", type=float, default=60)
-    parser.add_argument("--learning-rate", type=float, default=3e-3)
-    parser.add_argument("--from", dest="begin", type=pathlib.Path, help="a checkpoint (.pt) to begin with")
-    parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
+def command_line(description, make, train, parity, views):
+    """Runs `make`, `train` or `parity` of a network's program with the arguments that were typed; `views` is how many are
+    made unless told."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    verbs = parser.add_subparsers(required=True)
+    making = verbs.add_parser("make")
+    for name in ("meshes", "panoramas", "data"):
+        making.add_argument(name, type=pathlib.Path)
+    making.add_argument("--views", type=int, default=views)
+    making.add_argument("--seed", type=int, default=0)
+    making.set_defaults(run=make)
+    training = verbs.add_parser("train")
+    training.add_argument("data", type=pathlib.Path)
+    training.add_argument("--minutes", type=float, default=60)
+    training.add_argument("--learning-rate", type=float, default=3e-3)
+    training.add_argument("--from", dest="begin", type=pathlib.Path, help="a checkpoint (.pt) to begin with")
+    training.add_argument("-o", "--output", type=pathlib.Path, required=True)
+    training.set_defaults(run=train)
+    comparing = verbs.add_parser("parity")
+    comparing.add_argument("weights", type=pathlib.Path)
+    comparing.set_defaults(run=parity)
+    arguments = parser.parse_args()
+    arguments.run(arguments)
