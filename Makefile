@@ -196,12 +196,12 @@ bench: setup $(BENCH_VENV)/ready ## Measure relit-extract at 1080p against ffmpe
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
 
 bench-reader: setup $(DEMO)/mask.png $(BENCH_VENV)/ready ## Measure relight's reader of shards against Python webdataset
-	cargo build --locked --release -p relight-core --features files,threads --example read_turns
+	cargo build --locked --release -p relight-core --example read_turns
 	$(BENCH_VENV)/bin/python tests/bench/reader.py --reader $(TARGET)/release/examples/read_turns \
 	    --runs $(BENCH_RUNS) $(DEMO)/out
 
 bench-network: setup-train $(BENCH_VENV)/torch-ready ## Measure relight's training against PyTorch's
-	cargo build --locked --release -p relight-train --example network_speed
+	cargo build --locked --release -p relight-train --features libtorch --example network_speed
 	$(BENCH_VENV)/bin/python tests/bench/network.py --program $(TARGET)/release/examples/network_speed \
 	    --runs $(BENCH_RUNS)
 

@@ -1,6 +1,6 @@
 """The decomposing network: relight beside PyTorch, on one thread, in processor time.
 
-    cargo build --release -p relight --features train --example network_speed
+    cargo build --release -p relight-train --features libtorch --example network_speed
     python network.py --program target/release/examples/network_speed
 
 The same layers with random weights: steps of training (forward, backward, AdamW) on 24 pictures of

@@ -1,6 +1,6 @@
 """Images a second from shards: relight's reader beside the Python package `webdataset`.
 
-    cargo build --release -p relight --example read_turns
+    cargo build --release -p relight-core --example read_turns
     python reader.py --reader target/release/examples/read_turns FOLDER
 
 Both give the same: batches of 12 neighbours as 32-bit floating point arrays (channels first, 0 to

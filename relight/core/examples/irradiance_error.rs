@@ -1,7 +1,7 @@
 //! The error of the diffuse layer against exact integration over each panorama of a folder, by the order of the light, as
 //! a table in Markdown, with what an image costs.
 //!
-//!     cargo run --release -p relight-core --features files,threads --example irradiance_error -- FOLDER
+//!     cargo run --release -p relight-core --example irradiance_error -- FOLDER
 #![allow(clippy::print_stdout, reason = "it prints a table")]
 
 use std::error::Error;

@@ -1,7 +1,7 @@
 //! Makes the pictures of the manual: the conventions, the specular layers beside the ground truth, and a
 //! mug under turning light. All that they show is made here.
 //!
-//!     cargo run --release -p relight --example pictures -- docs/images
+//!     cargo run --release -p relight-core --example pictures -- docs/images
 
 mod integral;
 

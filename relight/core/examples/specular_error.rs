@@ -1,7 +1,7 @@
 //! The specular layers' errors against the Blinn-Phong highlight, summed over a panorama's pixels, on a sphere under each
 //! panorama of a folder, as a table in Markdown.
 //!
-//!     cargo run --release -p relight-core --features files,threads --example specular_error -- FOLDER
+//!     cargo run --release -p relight-core --example specular_error -- FOLDER
 #![allow(clippy::print_stdout, reason = "it prints a table")]
 
 mod integral;
