@@ -1,27 +1,26 @@
 //! The program `relit-extract`: command lines, results and failures.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::shard::{Dataset, FrameRecord, ShardReader};
 use relit_test_support::{ffmpeg, is_named, packets, turning};
 use serde_json::Value;
-use tempfile::TempDir;
+
+use super::support::Place;
 
 /// The object: a disc in the middle.
 const OBJECT: &str = "lt(hypot(X-50,Y-35),22)";
 
 struct Bench {
-    folder: TempDir,
+    place: Place,
 }
 
 impl Bench {
     fn new() -> Self {
         let bench = Self {
-            folder: tempfile::tempdir().unwrap(),
+            place: Place::new(),
         };
         bench.video("clip.mkv", "-pix_fmt yuvj422p -c:v mjpeg -q:v 2");
         let mask = image::GrayImage::from_fn(96, 72, |x, y| {
@@ -33,7 +32,7 @@ impl Bench {
     }
 
     fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.place.path(name)
     }
 
     fn video(&self, name: &str, encoding: &str) {
@@ -41,37 +40,17 @@ impl Bench {
         let mut arguments = vec!["-f", "lavfi", "-i", &pattern];
         arguments.extend(encoding.split_whitespace());
         arguments.push(name);
-        ffmpeg(self.folder.path(), &arguments);
+        ffmpeg(self.place.folder(), &arguments);
     }
 
-    /// The pattern moves, and no object does: its shifts are not looked for unless the line says so.
-    fn run(&self, line: &str) -> Output {
-        let extracts = line.contains(" -o ") && !line.contains("--align");
-        Command::new(env!("CARGO_BIN_EXE_relit-extract"))
-            .args(line.split_whitespace())
-            .args(extracts.then_some("--align=off"))
-            .current_dir(self.folder.path())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs the program, asserts the exit code, and returns standard error.
     #[track_caller]
     fn errors(&self, code: i32, line: &str) -> String {
-        let output = self.run(line);
-        let errors = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
-        errors
+        self.place.errors(code, &without_shifts(line))
     }
 
-    /// Runs the program with `--json`, asserts the exit code, and returns its events.
     #[track_caller]
     fn events(&self, code: i32, line: &str) -> Vec<Value> {
-        let output = self.run(&format!("{line} --json"));
-        let printed = String::from_utf8(output.stdout).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{line}: {printed}");
-        let events = printed.lines().map(serde_json::from_str);
-        events.collect::<Result<_, _>>().unwrap()
+        self.place.events(code, &without_shifts(line))
     }
 
     /// Runs `verify`, asserts the exit code, and returns its events.
@@ -100,6 +79,12 @@ impl Bench {
         records.sort_by_key(|record| record.index);
         records
     }
+}
+
+/// The pattern moves, and no object does: its shifts are not looked for unless the line says so.
+fn without_shifts(line: &str) -> String {
+    let extracts = line.contains(" -o ") && !line.contains("--align");
+    format!("{line}{}", if extracts { " --align=off" } else { "" })
 }
 
 #[test]
@@ -184,7 +169,7 @@ fn frames_that_replace_dropped_ones_are_flagged_and_not_the_originals() {
     let bench = Bench::new();
     let drop = r"noise=amount=0:drop=eq(n\,9)+eq(n\,10)+eq(n\,20)";
     ffmpeg(
-        bench.folder.path(),
+        bench.place.folder(),
         &["-i", "clip.mkv", "-c", "copy", "-bsf:v", drop, "gaps.mkv"],
     );
     let errors = bench.errors(0, "gaps.mkv --mask mask.png --frames 30 --size 32 -o out");
@@ -296,7 +281,7 @@ fn damaged_h264_gives_the_same_shard_for_any_number_of_threads() {
         "-pix_fmt yuv420p -c:v libx264 -g 6 -bf 2 -sc_threshold 0",
     );
     let mut bytes = fs::read(bench.path("film.mkv")).unwrap();
-    let packet = packets(bench.folder.path(), "film.mkv")[14];
+    let packet = packets(bench.place.folder(), "film.mkv")[14];
     bytes[packet.at + 8..packet.at + packet.size].fill(0);
     fs::write(bench.path("film.mkv"), bytes).unwrap();
     let mut shards = Vec::new();
@@ -335,14 +320,14 @@ fn a_name_that_is_not_utf_8_is_refused_and_does_not_stop_the_others() {
     use std::os::unix::ffi::OsStrExt;
     let bench = Bench::new();
     let odd = bench
-        .folder
-        .path()
-        .join(std::ffi::OsStr::from_bytes(b"od\xFFd.mkv"));
+        .place
+        .path(std::ffi::OsStr::from_bytes(b"od\xFFd.mkv"));
     fs::copy(bench.path("clip.mkv"), &odd).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+    let output = bench
+        .place
+        .command()
         .arg(&odd)
         .args("clip.mkv --mask mask.png --frames 30 --size 32 -o out".split(' '))
-        .current_dir(bench.folder.path())
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(3));
@@ -353,9 +338,10 @@ fn a_name_that_is_not_utf_8_is_refused_and_does_not_stop_the_others() {
 #[test]
 fn lines_that_do_not_fit_onto_the_disk_are_told() {
     let bench = Bench::new();
-    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+    let output = bench
+        .place
+        .command()
         .args("clip.mkv --mask mask.png --frames 30 --size 32 -o out".split(' '))
-        .current_dir(bench.folder.path())
         .stdout(fs::File::create("/dev/full").unwrap())
         .output()
         .unwrap();
@@ -484,7 +470,9 @@ fn a_session_folder_does_not_become_a_data_set() {
 fn with_json_events_are_printed_as_json_lines() {
     let bench = Bench::new();
     bench.video("film.mp4", "-pix_fmt yuv420p -c:v libx264");
-    let output = bench.run("film.mp4 --mask mask.png --frames 30 --size 32 -o out --json");
+    let output = bench
+        .place
+        .run("film.mp4 --mask mask.png --frames 30 --size 32 --align=off -o out --json");
     let said = String::from_utf8(output.stderr).unwrap();
     let events: Vec<serde_json::Value> = String::from_utf8(output.stdout)
         .unwrap()
@@ -688,7 +676,7 @@ fn frames_that_cannot_be_registered_are_placed_by_the_frames_around() {
         "2",
         "dark.avi",
     ];
-    ffmpeg(bench.folder.path(), &options);
+    ffmpeg(bench.place.folder(), &options);
     fs::copy(session.join("mask_gt.png"), bench.path("mask.png")).unwrap();
     let line = "dark.avi --mask mask.png --frames 150 --size 40 --align correct -o out";
     let errors = bench.errors(3, line);
@@ -730,7 +718,7 @@ fn a_shaken_object_that_the_border_cuts_off_gets_no_black_pixels_and_only_what_w
         let from = session.join(from);
         let options = ["-vf", "crop=480:250:0:0", "-q:v", "2"];
         let arguments = [&["-i", from.to_str().unwrap()][..], &options, &[to]].concat();
-        ffmpeg(bench.folder.path(), &arguments);
+        ffmpeg(bench.place.folder(), &arguments);
     };
     cut("video.mkv", "cut.avi");
     cut("mask_gt.png", "cut.png");

@@ -1,15 +1,14 @@
 //! The program `relit-extract` and what people give it: names that some file systems take for one, folders as they come
 //! from cameras, and masks of other programs.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use relit_data::shard::Dataset;
 use relit_test_support::{ffmpeg, is_named, turning};
-use tempfile::TempDir;
+
+use super::support::Place;
 
 const OBJECT_PX: u64 = 24 * 30;
 
@@ -18,11 +17,11 @@ fn is_inside(x: u32, y: u32) -> bool {
 }
 
 /// A folder with a mask and videos that differ.
-struct Inputs(TempDir);
+struct Inputs(Place);
 
 impl Inputs {
     fn new() -> Self {
-        let inputs = Self(tempfile::tempdir().unwrap());
+        let inputs = Self(Place::new());
         let mask = |x, y| Luma([if is_inside(x, y) { 255 } else { 0 }]);
         GrayImage::from_fn(64, 48, mask)
             .save(inputs.path("mask.png"))
@@ -31,7 +30,7 @@ impl Inputs {
     }
 
     fn path(&self, name: impl AsRef<Path>) -> PathBuf {
-        self.0.path().join(name)
+        self.0.path(name)
     }
 
     /// A video whose colours have this hue.
@@ -44,16 +43,17 @@ impl Inputs {
         let mut arguments = vec!["-f", "lavfi", "-i", &source];
         arguments.extend(encoding.split_whitespace());
         arguments.push(&made);
-        ffmpeg(self.0.path(), &arguments);
+        ffmpeg(self.0.folder(), &arguments);
         fs::rename(self.path(&made), path).unwrap();
     }
 
     /// The exit code, and what was written to standard error.
     fn extract(&self, arguments: &[&str]) -> (Option<i32>, String) {
-        let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        let output = self
+            .0
+            .command()
             .args(arguments)
             .args(["--frames", "4", "--size", "16", "--align=off"])
-            .current_dir(self.0.path())
             .output()
             .unwrap();
         let errors = String::from_utf8(output.stderr).unwrap();
@@ -160,11 +160,7 @@ fn a_name_that_begins_with_a_hyphen_is_a_file_after_two_hyphens_or_with_its_fold
         arguments.extend(["--size", "16", "--align=off", "--replace"]);
         arguments.extend(before);
         arguments.push(name);
-        let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
-            .args(arguments)
-            .current_dir(inputs.0.path())
-            .output()
-            .unwrap();
+        let output = inputs.0.command().args(arguments).output().unwrap();
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{name}: {errors}");
         inputs.assert_sound(&["-x"]);
@@ -230,7 +226,9 @@ fn what_lies_beside_sessions_is_named_once() {
     fs::write(inputs.path("sessions/notes.txt"), "text").unwrap();
     fs::rename(inputs.path("mask.png"), inputs.path("sessions/mask.png")).unwrap();
     let arguments = ["sessions", "--mask", "sessions/mask.png", "-o"];
-    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+    let output = inputs
+        .0
+        .command()
         .args(arguments)
         .args([
             "sessions/set",
@@ -241,7 +239,6 @@ fn what_lies_beside_sessions_is_named_once() {
             "--align=off",
             "--json",
         ])
-        .current_dir(inputs.0.path())
         .output()
         .unwrap();
     let said = String::from_utf8(output.stdout).unwrap();

@@ -1,58 +1,17 @@
 //! The program `relit-extract` on folders of clips with folders of masks, and on masks that do not fit.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use relit_data::shard::{Dataset, MaskMisfit, QualityVerdict};
-use tempfile::TempDir;
 
-const COW: &str = "20261120T101500Z-cow-short";
-const BUST: &str = "20261120T102000Z-bust-short";
-
-/// A session that comes with the repository.
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../fixtures")
-        .join(name)
-}
-
-struct Place(TempDir);
+use super::support::{BUST, COW, Place, fixture};
 
 impl Place {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
     fn copy(&self, from: &Path, to: &str) {
         let to = self.path(to);
         fs::create_dir_all(to.parent().unwrap()).unwrap();
         fs::copy(from, to).unwrap();
-    }
-
-    fn run(&self, line: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_relit-extract"))
-            .args(line.split_whitespace())
-            .current_dir(self.0.path())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs the program, asserts the exit code, and returns the JSON lines.
-    #[track_caller]
-    fn events(&self, code: i32, line: &str) -> Vec<serde_json::Value> {
-        let output = self.run(&format!("{line} --json"));
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
-        let text = String::from_utf8(output.stdout).unwrap();
-        text.lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
     }
 
     fn ids(&self, out: &str) -> Vec<String> {

@@ -1,53 +1,17 @@
 //! The program `relit-extract` on finished data sets: merged, and turned from one layout into the other.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use relit_data::shard::{Dataset, Layout};
-use tempfile::TempDir;
 
-const COW: &str = "20261120T101500Z-cow-short";
-const BUST: &str = "20261120T102000Z-bust-short";
-
-struct Place(TempDir);
+use super::support::{BUST, COW, Place, fixture};
 
 impl Place {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, line: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_relit-extract"))
-            .args(line.split_whitespace())
-            .current_dir(self.0.path())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs the program, asserts the exit code, and returns the JSON lines.
-    #[track_caller]
-    fn events(&self, code: i32, line: &str) -> Vec<serde_json::Value> {
-        let output = self.run(&format!("{line} --json"));
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
-        let text = String::from_utf8(output.stdout).unwrap();
-        text.lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
-    }
-
     /// Extracts a session that comes with the repository.
     fn extract(&self, session: &str, more: &str) {
-        let session = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../../fixtures")
-            .join(session);
+        let session = fixture(session);
         let (session, mask) = (session.display(), session.join("mask_gt.png"));
         let mask = mask.display();
         let settings = "--frames 40 --size 32 --align off";
@@ -80,7 +44,7 @@ impl Place {
 
     /// What lies in the folder, with hidden files.
     fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.0.path()).unwrap();
+        let entries = fs::read_dir(self.folder()).unwrap();
         let mut names: Vec<String> = entries
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
             .collect();
