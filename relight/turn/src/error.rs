@@ -17,6 +17,9 @@ pub enum TurnError {
     /// The shard cannot be opened.
     #[error(transparent)]
     Open(#[from] ReadError),
+    /// The folder of the results cannot be read or written.
+    #[error(transparent)]
+    Folder(#[from] FolderFault),
     /// Any other fault, as a sentence.
     #[error("{0}")]
     Refused(String),
@@ -86,26 +89,5 @@ impl TurnError {
 impl From<LightError> for TurnError {
     fn from(_: LightError) -> Self {
         Self::NoLight
-    }
-}
-
-impl From<FolderFault> for TurnError {
-    fn from(fault: FolderFault) -> Self {
-        Self::Refused(match fault {
-            FolderFault::Foreign(path, name) => format!(
-                "{} holds {name}, which is not a result of a turn: give a folder that is new, empty, or holds an earlier result",
-                path.display()
-            ),
-            FolderFault::NoFolder(path) => format!(
-                "{} cannot be the folder for the results: give the name of a folder, not of a file",
-                path.display()
-            ),
-            FolderFault::Read(path, source) => {
-                format!("{} cannot be read: {source}", path.display())
-            }
-            FolderFault::Write(path, source) => {
-                format!("{} cannot be written: {source}", path.display())
-            }
-        })
     }
 }

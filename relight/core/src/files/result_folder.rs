@@ -13,15 +13,22 @@ use std::process;
 use relit_data::durable::{Partial, publish, sync_folder};
 
 /// Why a folder is not written.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum FolderFault {
     /// It holds something else: its name.
+    #[error(
+        "{path} holds {1}, which is not one of the results: give a folder that is new, empty, or holds only earlier results",
+        path = .0.display()
+    )]
     Foreign(PathBuf, String),
     /// The path exists and is not a folder.
+    #[error("{} cannot be the folder for the results: give the name of a folder, not of a file", .0.display())]
     NoFolder(PathBuf),
     /// It cannot be read.
+    #[error("{path} cannot be read: {1}", path = .0.display())]
     Read(PathBuf, io::Error),
     /// It, or what it lies in, cannot be written.
+    #[error("{path} cannot be written: {1}", path = .0.display())]
     Write(PathBuf, io::Error),
 }
 

@@ -23,6 +23,10 @@ pub enum DecomposeError {
     /// An image cannot be read or written.
     #[error(transparent)]
     Image(ImageError),
+    /// The folder of the results cannot be read or written.
+    #[cfg(feature = "files")]
+    #[error(transparent)]
+    Folder(#[from] FolderFault),
     /// Any other fault, as a sentence.
     #[error("{0}")]
     Photo(String),
@@ -66,27 +70,6 @@ impl DecomposeError {
     pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |reason| Self::file(&path, format!("could not be written: {reason}"))
-    }
-}
-
-#[cfg(feature = "files")]
-impl From<FolderFault> for DecomposeError {
-    fn from(fault: FolderFault) -> Self {
-        match fault {
-            FolderFault::Foreign(path, name) => Self::file(
-                &path,
-                format!(
-                    "holds {name}, which is not part of a decomposition: give a folder that is new, empty, or holds only an \
-                     earlier decomposition"
-                ),
-            ),
-            FolderFault::NoFolder(path) => Self::file(
-                &path,
-                "cannot be the folder for the results: give the name of a folder, not of a file",
-            ),
-            FolderFault::Read(path, source) => Self::read(&path)(source),
-            FolderFault::Write(path, source) => Self::write(&path)(source),
-        }
     }
 }
 
