@@ -52,7 +52,7 @@ pub use mesh::Mesh;
 pub use pack::{
     LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library, is_packed,
 };
-pub use random::stream;
+pub use random::{normal_of, stream};
 pub use samples::folder::{SampleFolder, SynthSummary, write_samples};
 pub use samples::object::{ObjectSource, SyntheticView};
 pub use samples::recipe::Recipe;

@@ -27,6 +27,19 @@ pub(super) fn mix(value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// A number for a hash, nearly normally distributed, mean 0, standard deviation 1: the sum of four even numbers.
+///
+/// ```
+/// use relight_synth::{normal_of, stream};
+/// let squares = (0..1000).map(|number| normal_of(stream(7, number)).powi(2));
+/// assert!((squares.sum::<f32>() / 1000.0 - 1.0).abs() < 0.1);
+/// ```
+pub fn normal_of(hash: u64) -> f32 {
+    let parts = [0, 16, 32, 48].map(|shift| (hash >> shift & 0xffff) as f32 / 65_535.0);
+    // Each has the variance 1 / 12.
+    (parts.iter().sum::<f32>() - 2.0) * 3.0_f32.sqrt()
+}
+
 /// The upper 24 bits of a hash as a number in 0..1, 1 left out.
 pub(super) fn unit_of(hash: u64) -> f32 {
     (hash >> 40) as f32 / (1_u64 << 24) as f32

@@ -6,7 +6,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ImageFormat, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use crate::random::{Random, mix};
+use crate::random::{Random, mix, normal_of};
 use relight_core::image::{ColourSpace, Srgb};
 use relit_data::statistics::ranked;
 
@@ -176,13 +176,6 @@ fn response_table(response: Response) -> Vec<u8> {
         (response.encode(root * root) * 255.0).round() as u8
     };
     (0..ENTRIES).map(value).collect()
-}
-
-/// Nearly normally distributed, mean 0, standard deviation 1: the sum of four even numbers.
-fn normal_of(hash: u64) -> f32 {
-    let parts = [0, 16, 32, 48].map(|shift| (hash >> shift & 0xffff) as f32 / 65_535.0);
-    // Each has the variance 1 / 12.
-    (parts.iter().sum::<f32>() - 2.0) * 3.0_f32.sqrt()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use tch::{Device, Kind, Tensor};
 
 use crate::engine::tensors::indices;
-use relight_synth::stream;
+use relight_synth::{normal_of, stream};
 
 /// Tiles of noise: each sample has one of them.
 const TILES: usize = 32;
@@ -30,10 +30,4 @@ impl NoiseTiles {
         let chosen = indices(seeds.iter().map(|seed| *seed as usize % TILES), device);
         self.0.index_select(0, &chosen).to_kind(kind)
     }
-}
-
-/// Nearly normally distributed, mean 0, standard deviation 1: the sum of four even numbers, each of the variance 1 / 12.
-fn normal_of(hash: u64) -> f32 {
-    let parts = [0, 16, 32, 48].map(|shift| (hash >> shift & 0xffff) as f32 / 65_535.0);
-    (parts.iter().sum::<f32>() - 2.0) * 3.0_f32.sqrt()
 }
