@@ -276,11 +276,6 @@ impl Stepper {
         self.held = false;
     }
 
-    /// Whether a hold is on.
-    pub fn is_held(&self) -> bool {
-        self.held
-    }
-
     /// Stops at once and forgets the plan. Nothing moves until [`Stepper::clear_halt`].
     pub fn halt(&mut self) {
         self.halted_in_motion |= self.due;

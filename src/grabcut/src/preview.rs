@@ -1,7 +1,7 @@
 //! Pictures of a mask: the image by which a person checks it, and PNG in memory.
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{GrayImage, RgbImage};
+use image::{GrayImage, ImageBuffer, PixelWithColorType, RgbImage};
 
 use super::MaskError;
 use super::bitmap::Bitmap;
@@ -49,13 +49,11 @@ fn dimmed(level: u8) -> u8 {
 /// # Errors
 /// [`MaskError::Encode`].
 pub fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, MaskError> {
-    let mut bytes = Vec::new();
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::NoFilter);
-    match image.write_with_encoder(encoder) {
-        Ok(()) => Ok(bytes),
-        Err(source) => Err(MaskError::Encode { what, source }),
-    }
+    png(
+        image,
+        (CompressionType::Default, FilterType::NoFilter),
+        what,
+    )
 }
 
 /// A colour image as PNG, with fast compression. `what` names the image in the error.
@@ -63,13 +61,22 @@ pub fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, MaskEr
 /// # Errors
 /// [`MaskError::Encode`].
 pub fn rgb_png(image: &RgbImage, what: &'static str) -> Result<Vec<u8>, MaskError> {
+    png(image, (CompressionType::Fast, FilterType::Adaptive), what)
+}
+
+fn png<P>(
+    image: &ImageBuffer<P, Vec<u8>>,
+    (compression, filter): (CompressionType, FilterType),
+    what: &'static str,
+) -> Result<Vec<u8>, MaskError>
+where
+    P: PixelWithColorType<Subpixel = u8>,
+{
     let mut bytes = Vec::new();
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
-    match image.write_with_encoder(encoder) {
-        Ok(()) => Ok(bytes),
-        Err(source) => Err(MaskError::Encode { what, source }),
-    }
+    let encoder = PngEncoder::new_with_quality(&mut bytes, compression, filter);
+    let written = image.write_with_encoder(encoder);
+    written.map_err(|source| MaskError::Encode { what, source })?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -258,14 +258,6 @@ impl Aligner {
         self.min_confidence
     }
 
-    /// Where the object is in a frame, in pixels of the frame.
-    pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
-        let lumas = self
-            .required_regions
-            .lumas_of_sample(&frame.0, &mut buffers.lumas);
-        self.located(lumas, &mut buffers.gradients).0
-    }
-
     /// Looks at these rows of a frame's crop, which has the size of the mask; they come from the top to the bottom.
     pub fn take_rows(&self, crop: CropView<'_>, rows: Range<u32>, buffers: &mut AlignBuffers) {
         let rows = rows.start as usize..rows.end as usize;

@@ -1,6 +1,7 @@
 //! The colours of the pixels over the turn, in linear light: what adds up when light adds up.
 
 use image::RgbImage;
+use relit_data::srgb::to_linear_f32;
 
 /// The courses of all pixels: three numbers for each frame.
 #[derive(Debug, Clone)]
@@ -28,7 +29,7 @@ impl PixelSeries {
             levels,
             length,
             size,
-            linear: std::array::from_fn(|level| linear_from_srgb(level as f32 / 255.0)),
+            linear: std::array::from_fn(|level| to_linear_f32(level as f32 / 255.0)),
         }
     }
 
@@ -57,14 +58,6 @@ fn scale(course: &mut [f32], many: usize) {
     course.iter_mut().for_each(|value| *value *= by);
 }
 
-fn linear_from_srgb(value: f32) -> f32 {
-    if value <= 0.040_45 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
-}
-
 /// The scalar product, in several sums that a processor adds up side by side.
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
@@ -90,7 +83,7 @@ mod tests {
         let mean = series.mean(&[7, 8]);
         assert_eq!((mean.len(), mean[0]), (6, 0.0));
         assert!((mean[3] - 1.0).abs() < 1e-6);
-        let green = [20.0_f32, 30.0].map(|level| linear_from_srgb(level / 255.0));
+        let green = [20.0_f32, 30.0].map(|level| to_linear_f32(level / 255.0));
         assert!((mean[1] - (green[0] + green[1]) / 2.0).abs() < 1e-6);
     }
 }

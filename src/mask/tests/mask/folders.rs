@@ -3,25 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use image::{Rgb, RgbImage};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::support::{code, read, relit_mask, said, video};
+use super::support::{code, photograph, read, relit_mask, said, video};
 use relit_test_support::disc::AROUND;
 
 const BOX: &str = "16,4,64,64";
-
-/// A photograph of a disc of this radius on grey.
-fn photograph(radius: f64) -> RgbImage {
-    RgbImage::from_fn(96, 72, |x, y| {
-        if (f64::from(x) - 48.0).hypot(f64::from(y) - 36.0) < radius {
-            Rgb([220, 120, 40])
-        } else {
-            Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3])
-        }
-    })
-}
 
 /// A folder `photos` with two photographs.
 fn photographs() -> TempDir {

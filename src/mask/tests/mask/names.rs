@@ -2,26 +2,13 @@
 
 use std::fs;
 
-use image::{Rgb, RgbImage};
-
-use super::support::{code, read, relit_mask, said, video};
-
-/// A disc of this radius on grey.
-fn picture(radius: f64) -> RgbImage {
-    RgbImage::from_fn(96, 72, |x, y| {
-        if (f64::from(x) - 48.0).hypot(f64::from(y) - 36.0) < radius {
-            Rgb([220, 120, 40])
-        } else {
-            Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3])
-        }
-    })
-}
+use super::support::{code, photograph, read, relit_mask, said, video};
 
 #[test]
 fn the_picture_that_is_named_is_read_whatever_its_name() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    picture(20.0).save(folder.join("plain.png")).unwrap();
+    photograph(20.0).save(folder.join("plain.png")).unwrap();
     let mask = |name: &str, arguments: &[&str]| {
         let out = ["--rect", "16,4,64,64", "-o", "out.png", "--force"];
         let output = relit_mask(folder, &[&out, arguments].concat());
@@ -31,7 +18,7 @@ fn the_picture_that_is_named_is_read_whatever_its_name() {
     let wanted = mask("plain.png", &["plain.png"]);
     // What the names would mean as patterns and protocols.
     for name in ["cup0.png", "cup00.png", "x.png", "a.png", "cup1.png"] {
-        picture(9.0).save(folder.join(name)).unwrap();
+        photograph(9.0).save(folder.join(name)).unwrap();
     }
     for name in [
         "cup%d.png",

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use image::{Rgb, RgbImage};
 use tempfile::TempDir;
 
 use relit_test_support::disc::{HEIGHT, WIDTH, in_disc};
@@ -24,6 +25,17 @@ pub(crate) fn video() -> Vec<u8> {
         bytes.extend(vec![128; (2 * WIDTH * HEIGHT) as usize]);
     }
     bytes
+}
+
+/// A photograph of a disc of this radius on grey.
+pub(crate) fn photograph(radius: f64) -> RgbImage {
+    RgbImage::from_fn(96, 72, |x, y| {
+        if (f64::from(x) - 48.0).hypot(f64::from(y) - 36.0) < radius {
+            Rgb([220, 120, 40])
+        } else {
+            Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3])
+        }
+    })
 }
 
 pub(crate) fn relit_mask(folder: &Path, arguments: &[&str]) -> Output {
