@@ -8,7 +8,7 @@ use relit_data::counts::count_of;
 use relit_data::shard::{QualityVerdict, SessionEntry, SessionQuality};
 use relit_extract::ExtractError;
 use relit_extract::objects::described;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
 /// Sessions that are printed for a person.
 const MAX_PRINTED: usize = 200;
@@ -95,9 +95,8 @@ fn percent(part: u64, whole: u64) -> f64 {
 }
 
 /// One session for a machine.
-fn event(entry: &SessionEntry) -> Value {
-    json!({
-        "event": "session",
+fn event(entry: &SessionEntry) -> Event {
+    Event::Session(json!({
         "session": entry.id,
         "object": entry.object,
         "samples": entry.samples,
@@ -106,7 +105,7 @@ fn event(entry: &SessionEntry) -> Value {
         "lossy": entry.lossy,
         "warnings": entry.warnings,
         "quality": entry.quality,
-    })
+    }))
 }
 
 /// All sessions together, for a person and for a machine.
