@@ -1,7 +1,7 @@
 """The network that tells object, table and room in a turn (src/grabcut/src/turn/network): its data and its training.
 
     python turn_network.py make MESHES PANORAMAS DATA
-    python turn_network.py train DATA --minutes 180 -o src/grabcut/src/turn/network/weights.safetensors
+    python turn_network.py train DATA --minutes 84 --learning-rate 2e-3 -o src/grabcut/src/turn/network/weights.safetensors
 
 With the packages of requirements-network.txt. Half of the turns are flat drawings: shapes that no mesh has, rooms of
 stripes and spots, tables that fill the lower border, or none. The others are those of turns.py, of other objects and panoramas
@@ -344,4 +344,4 @@ def parity(arguments):
 
 
 if __name__ == "__main__":
-    unet.command_line(__doc__, make, train, parity, views=560)
+    unet.command_line(__doc__, make, train, parity, views=760)

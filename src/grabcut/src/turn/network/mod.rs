@@ -1,9 +1,9 @@
 //! A small network that says of each pixel of a turn whether it shows the object, the table or the room.
 //!
 //! It sees what the frames show at each pixel over the whole turn ([`observations`]), with at most 320 pixels on the longer
-//! side. An encoder and a decoder with connections between layers of the same size (Ronneberger, Fischer and Brox, "U-Net",
-//! 2015), and residual blocks (He et al., "Deep residual learning", 2016), have learned from rendered turns;
-//! `docs/methods/masking.md` says from which.
+//! side. An encoder, most of which began as the first blocks of EfficientNet-lite0 (Tan and Le, 2019), and a decoder with
+//! connections between layers of the same size (Ronneberger, Fischer and Brox, "U-Net", 2015) have learned from rendered
+//! turns; `docs/methods/masking.md` says from which.
 
 mod observations;
 
@@ -19,7 +19,7 @@ const SIDE: u32 = 320;
 const CLASSES: usize = 3;
 const OBJECT: usize = 0;
 const TABLE: usize = 1;
-/// The weights of the layers, 16-bit numbers.
+/// The weights of the layers.
 const WEIGHTS: &[u8] = include_bytes!("weights.safetensors");
 
 /// What the network says of a turn.
@@ -150,9 +150,9 @@ mod tests {
         (17, [0.274_61, 0.658_76, 0.0]),
     ];
     const LOGITS: [[f32; 3]; 3] = [
-        [1.869_19, -5.349_46, -5.066_55],
-        [-2.717_02, -7.302_54, 0.720_20],
-        [-0.320_81, 5.529_08, 0.981_57],
+        [-4.450_32, -2.159_12, -5.124_57],
+        [-0.258_37, -3.608_80, 1.357_03],
+        [1.031_06, 3.092_35, 1.127_65],
     ];
 
     #[test]
