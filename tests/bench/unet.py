@@ -15,8 +15,8 @@ from torch.nn import functional
 from torch.nn.functional import interpolate
 
 WIDTHS, NARROW, HEAD = (24, 40, 56, 72, 88), 12, 16
-# Residual blocks of the encoder at each size.
-RESIDUAL = (0, 1, 2, 2, 2)
+# Residual blocks of the encoder at each size that begins with random weights.
+RESIDUAL = 2
 # A layer of so many weights is large.
 MANY = 10_000
 # The learning rate of what has learned already, as a share.
@@ -42,9 +42,9 @@ class Residual(nn.Module):
 
 class Network(nn.Module):
     """Logits of `classes` from `planes`, to which column and row are added. `learned` are the blocks of the encoder's
-    first sizes, if they have learned already, and `skips` their channels."""
+    first sizes, which have learned already, and `skips` their channels."""
 
-    def __init__(self, planes, classes, learned=(), skips=()):
+    def __init__(self, planes, classes, learned, skips):
         super().__init__()
         inputs = [planes + 2, *skips, *WIDTHS[len(skips) :]]
         own = [self.block(inputs[at], at) for at in range(len(skips), len(WIDTHS))]
@@ -62,7 +62,7 @@ class Network(nn.Module):
     @staticmethod
     def block(inputs, at):
         width = WIDTHS[at]
-        return nn.Sequential(layer(inputs, width), layer(width, width), *(Residual(width) for _ in range(RESIDUAL[at])))
+        return nn.Sequential(layer(inputs, width), layer(width, width), *(Residual(width) for _ in range(RESIDUAL)))
 
     def groups(self, learning_rate):
         """The parameters, with their learning rates: those that have learned already change less."""
@@ -111,13 +111,6 @@ def prepared(source):
             yield ready
 
 
-def begin(network, path):
-    """Takes the weights of a checkpoint; residual blocks that it lacks begin as nothing."""
-    missing, unknown = network.load_state_dict(torch.load(path), strict=False)
-    if unknown or any(".layers." not in name for name in missing):
-        raise SystemExit(f"{path} has other layers than the network")
-
-
 def fit(network, mean, batches, loss_of, overlap_of, arguments):
     """Trains a network for some minutes; `mean` becomes the running mean of its weights, which is written.
 
@@ -125,7 +118,7 @@ def fit(network, mean, batches, loss_of, overlap_of, arguments):
     """
     network.to(memory_format=torch.channels_last)
     if arguments.begin:
-        begin(network, arguments.begin)
+        network.load_state_dict(torch.load(arguments.begin))
     mean.load_state_dict(network.state_dict())
     optimiser = torch.optim.AdamW(network.groups(arguments.learning_rate), weight_decay=1e-2)
     begun, recent = time.monotonic(), []

@@ -1,4 +1,4 @@
-//! Order statistics of samples: median and quantiles.
+//! Order statistics of samples: medians and the like.
 //!
 //! All of them are samples themselves, by the nearest rank. Nothing is interpolated. Samples are compared by the total
 //! order of floating-point numbers.

@@ -17,7 +17,7 @@ use relit_data::durable::{Partial, publish, sync_folder};
 pub enum FolderFault {
     /// It holds something else: its name.
     #[error(
-        "{path} holds {1}, which is not one of the results: give a folder that is new, empty, or holds only earlier results",
+        "{path} holds {1}, which no earlier run wrote: give a folder that is new, empty, or holds only earlier results",
         path = .0.display()
     )]
     Foreign(PathBuf, String),

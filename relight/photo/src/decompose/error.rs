@@ -63,13 +63,13 @@ impl DecomposeError {
     /// Puts the path to an operating system's reason.
     pub(crate) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        move |reason| Self::file(&path, format!("could not be read: {reason}"))
+        move |reason| Self::file(&path, format!("cannot be read: {reason}"))
     }
 
     /// Puts the path to an operating system's reason.
     pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        move |reason| Self::file(&path, format!("could not be written: {reason}"))
+        move |reason| Self::file(&path, format!("cannot be written: {reason}"))
     }
 }
 

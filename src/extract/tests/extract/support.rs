@@ -56,8 +56,8 @@ impl Place {
     pub(crate) fn events(&self, code: i32, line: &str) -> Vec<Value> {
         let output = self.run(&format!("{line} --json"));
         let errors = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
         let text = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{line}: {errors}{text}");
         text.lines()
             .map(|line| serde_json::from_str(line).unwrap())
             .collect()

@@ -1,9 +1,9 @@
 //! A small network that says of each pixel of a turn whether it shows the object, the table or the room.
 //!
 //! It sees what the frames show at each pixel over the whole turn ([`observations`]), with at most 320 pixels on the longer
-//! side. The encoder began, but for its coarsest size, as the first blocks of EfficientNet-lite0 (Tan and Le, 2019); the
-//! decoder has connections to layers of the same size (Ronneberger, Fischer and Brox, "U-Net", 2015). Both have learned from
-//! rendered turns; `docs/methods/masking.md` says from which.
+//! side. Four of the encoder's five sizes began as the first blocks of EfficientNet-lite0 (Tan and Le, 2019), the coarsest
+//! has residual blocks (He et al., 2016); the decoder has connections to layers of the same size (Ronneberger, Fischer and
+//! Brox, "U-Net", 2015). They have learned from rendered and drawn turns; `docs/methods/masking.md` says from which.
 
 mod observations;
 
