@@ -1,20 +1,24 @@
 //! A small network that says of each pixel of a turn whether it shows the object, the table or the room.
 //!
-//! It sees what the frames show at each pixel over the whole turn ([`observations`]), with at most 320 pixels on the longer
+//! It sees what the frames show at each pixel over the whole turn ([`observations`]), with 160 to 320 pixels on the longer
 //! side. Four of the encoder's five sizes began as the first blocks of EfficientNet-lite0 (Tan and Le, 2019), the coarsest
 //! has residual blocks (He et al., 2016); the decoder has connections to layers of the same size (Ronneberger, Fischer and
 //! Brox, "U-Net", 2015). They have learned from rendered and drawn turns; `docs/methods/masking.md` says from which.
 
 mod observations;
 
+use std::cmp::Ordering;
+
 use image::RgbImage;
-use image::imageops::thumbnail;
+use image::imageops::{FilterType, resize, thumbnail};
 
 use crate::unet::{LEVELS, Network, resized};
 use observations::observe;
 
 /// Frames are reduced to at most so many pixels on their longer side.
-const SIDE: u32 = 320;
+const MAX_SIDE: u32 = 320;
+/// Smaller frames are enlarged to so many: the network has hardly seen any.
+const MIN_SIDE: u32 = 160;
 /// Classes of a pixel: object, table, room.
 const CLASSES: usize = 3;
 const OBJECT: usize = 0;
@@ -40,15 +44,7 @@ impl Classes {
         if width == 0 || height == 0 {
             return None;
         }
-        let scale = f64::from(SIDE) / f64::from(width.max(height));
-        let small = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
-        let reduced: Vec<RgbImage> = if scale < 1.0 {
-            let each = frames.iter();
-            each.map(|frame| thumbnail(frame, small(width), small(height)))
-                .collect()
-        } else {
-            frames.to_vec()
-        };
+        let reduced: Vec<RgbImage> = frames.iter().map(at_known_size).collect();
         let (width, height) = reduced.first()?.dimensions();
         let (width, height) = (width as usize, height as usize);
         let logits = network.apply(observe(&reduced, 1 << LEVELS));
@@ -79,6 +75,20 @@ impl Classes {
     /// The same of the table.
     pub(crate) fn table(&self, size: (usize, usize)) -> Vec<f32> {
         resized(&self.table, self.size, size)
+    }
+}
+
+/// A frame in a size that the network knows.
+fn at_known_size(frame: &RgbImage) -> RgbImage {
+    let (width, height) = frame.dimensions();
+    let longer = width.max(height);
+    let wanted = longer.clamp(MIN_SIDE, MAX_SIDE);
+    let scale = f64::from(wanted) / f64::from(longer);
+    let side = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
+    match wanted.cmp(&longer) {
+        Ordering::Less => thumbnail(frame, side(width), side(height)),
+        Ordering::Equal => frame.clone(),
+        Ordering::Greater => resize(frame, side(width), side(height), FilterType::Triangle),
     }
 }
 
