@@ -123,7 +123,7 @@ fn what_is_broken_or_damaged_decides_the_exit_code_of_a_merge() {
     place.extract(BUST, "-o b");
     place.events(3, "merge misfit b -o c");
     place.assert_sound("c", 80);
-    let tar = place.path(&format!("b/{BUST}.tar"));
+    let tar = place.path(format!("b/{BUST}.tar"));
     let mut bytes = fs::read(&tar).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
@@ -176,7 +176,7 @@ fn a_converted_data_set_is_what_an_extraction_in_that_layout_gives() {
 fn damage_in_a_folder_of_images_ends_a_conversion_and_leaves_nothing() {
     let place = Place::new();
     place.extract(COW, "--layout paper -o a");
-    let image = |name: &str| place.path(&format!("a/imgs/{COW}/{name}"));
+    let image = |name: &str| place.path(format!("a/imgs/{COW}/{name}"));
     fs::copy(image("7.png"), image("8.png")).unwrap();
     place.events(1, "convert a -o b --layout webdataset");
     fs::remove_file(image("8.png")).unwrap();

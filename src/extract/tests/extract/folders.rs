@@ -103,7 +103,7 @@ fn a_folder_of_clips_with_a_folder_of_masks_is_like_a_folder_of_sessions() {
     // Each has its own mask.
     let dataset = Dataset::read(&place.path("out")).unwrap();
     for (entry, mask) in dataset.sessions.iter().zip(["cow", "the bust"]) {
-        let bytes = fs::read(place.path(&format!("masks/{mask}.png"))).unwrap();
+        let bytes = fs::read(place.path(format!("masks/{mask}.png"))).unwrap();
         assert_eq!(entry.mask.blake3, relit_data::shard::Digest::hash(&bytes));
     }
     let events = place.events(0, &format!("{line} --resume"));
