@@ -39,6 +39,20 @@ impl PhotoArguments {
         self.photos.iter().any(|path| path.is_dir())
     }
 
+    /// Whether there may be several photographs.
+    pub(crate) fn is_set(&self) -> bool {
+        self.photos.len() > 1 || self.has_set()
+    }
+
+    /// The fault of the combination of arguments, if there is one.
+    pub(crate) fn fault(&self) -> Option<String> {
+        let mask = self.mask.as_ref().filter(|mask| !mask.is_dir())?;
+        self.is_set().then(|| {
+            let mask = mask.display();
+            format!("--mask {mask} is one mask for several photographs: give a folder of masks")
+        })
+    }
+
     pub(crate) fn reading(&self) -> PhotoReading {
         PhotoReading {
             mask: self.mask.clone(),

@@ -44,12 +44,7 @@ pub(crate) struct Arguments {
 impl Arguments {
     /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
-        let mask = self.photos.mask.as_ref().filter(|mask| !mask.is_dir())?;
-        let is_one = matches!(self.photos.photos.as_slice(), [photo] if !photo.is_dir());
-        (!is_one).then(|| {
-            let mask = mask.display();
-            format!("--mask {mask} is one mask for several photographs: give a folder of masks")
-        })
+        self.photos.fault()
     }
 }
 

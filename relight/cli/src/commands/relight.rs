@@ -104,11 +104,14 @@ impl Arguments {
                 "give the new light with --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
             );
         }
-        let has_file = self.light.light.is_some() && !self.is_own_light();
-        if self.background == Some(BackgroundName::Light) && !has_file {
+        let has_panorama = self.light.files().1.is_some() && !self.is_own_light();
+        if self.background == Some(BackgroundName::Light) && !has_panorama {
             return Some("--background light needs a panorama: give one with --light".to_owned());
         }
-        if self.is_set() {
+        if let Some(fault) = self.photos.fault() {
+            return Some(fault);
+        }
+        if self.photos.is_set() {
             let is_picture = OutputKind::from_path(&self.output).is_some();
             return (is_picture && !self.output.is_dir()).then(|| {
                 format!(
@@ -128,11 +131,6 @@ impl Arguments {
             Some(_) => return None,
         };
         Some(format!("--output {}: give {wanted}", self.output.display()))
-    }
-
-    /// Whether results go into a folder.
-    fn is_set(&self) -> bool {
-        self.photos.photos.len() > 1 || self.photos.has_set()
     }
 
     fn is_own_light(&self) -> bool {
@@ -162,7 +160,7 @@ impl Arguments {
     }
 
     fn output_of(&self, name: &str) -> PathBuf {
-        if !self.is_set() {
+        if !self.photos.is_set() {
             return self.output.clone();
         }
         let ending = match self.rotation.rotate {
@@ -197,7 +195,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         reading: arguments.photos.reading(),
         photos: inputs.iter().map(|input| input.path.clone()).collect(),
     };
-    if !arguments.is_set()
+    if !arguments.photos.is_set()
         && let [input] = inputs.as_slice()
     {
         run.relight(input, console)?;
@@ -276,7 +274,7 @@ impl Run<'_> {
     /// Refuses to overwrite inputs, and makes the folders of outputs.
     fn check_outputs(&self, output: &Path, name: &str) -> Result<(), Box<dyn Error>> {
         let arguments = self.arguments;
-        if arguments.is_set() {
+        if arguments.photos.is_set() {
             PhotoInput::check_result(output)?;
         }
         let mask = arguments
