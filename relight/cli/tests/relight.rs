@@ -227,6 +227,17 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             "needs a panorama",
         ),
         (
+            format!("{one} --light text.txt --background light -o o.png"),
+            2,
+            "needs a panorama",
+        ),
+        (
+            "relight photos/one.png photos/two.png --mask masks/one.png --lamp 30,40 -o o"
+                .to_owned(),
+            2,
+            "masks/one.png",
+        ),
+        (
             format!("{one} --light own --lamp 30,40 -o o.png"),
             2,
             "--lamp",
@@ -599,6 +610,11 @@ fn a_decomposition_s_folder_is_an_object_and_a_rectangle_shows_one() {
     assert!(lit.pixel(32, 24)[0] > 0.2 && lit.pixel(13, 5) == [0.0; 3]);
     let command = format!("insert cut --into photos/two.png {common} folder.png");
     assert_eq!(folder.code_and_errors(&command).0, 0);
+    let albedo = fs::read(folder.path("cut/albedo.png")).unwrap();
+    let command = format!("insert cut --into photos/two.png {common} cut/albedo.png");
+    let (code, errors) = folder.code_and_errors(&command);
+    assert!(code == 1 && errors.contains("cut/albedo.png"), "{errors}");
+    assert_eq!(fs::read(folder.path("cut/albedo.png")).unwrap(), albedo);
     let command = format!("insert cut {rect} --into photos/two.png {common} none.png");
     let (code, errors) = folder.code_and_errors(&command);
     assert!(code == 1 && errors.contains("cut"), "{errors}");

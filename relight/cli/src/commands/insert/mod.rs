@@ -5,6 +5,7 @@ mod arguments;
 use std::path::{Path, PathBuf};
 
 use relight_photo::compositing::SceneObject;
+use relight_photo::export::object_files;
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion, OutputKind};
 use relight_photo::relighting::{PanoramaExposure, SeenSun};
 use relit_console::{Console, Outcome, ProgressBar};
@@ -43,7 +44,9 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             path.display()
         ));
     }
-    let inputs: Vec<PathBuf> = scene.files().map(file).collect();
+    let inputs: Vec<PathBuf> = (scene.files().map(file))
+        .flat_map(|path| object_files(&path))
+        .collect();
     not_an_input(&arguments.output, &inputs)?;
     let network = arguments.network.read()?;
     let (decomposer, options) = (&network.decomposer, network.options);
