@@ -154,7 +154,7 @@ impl ImageArguments {
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let RenderedResult::Image(arguments) = &arguments.result;
     arguments.check_outputs()?;
-    let scene = LitObject::read(arguments)?;
+    let scene = LitObject::read(arguments, console)?;
     let frames = match OutputKind::from_path(&arguments.output) {
         Some(OutputKind::Movie(format)) => film(arguments, format, &scene, console)?,
         _ => {
@@ -179,8 +179,8 @@ struct LitObject {
 }
 
 impl LitObject {
-    fn read(arguments: &ImageArguments) -> Result<Self, Box<dyn Error>> {
-        let surface = arguments.object.read()?;
+    fn read(arguments: &ImageArguments, console: Console) -> Result<Self, Box<dyn Error>> {
+        let surface = arguments.object.read(console)?;
         let light = arguments.read_light()?;
         let settings = arguments.settings(&light);
         Ok(Self {

@@ -11,6 +11,7 @@ use relight_core::image::{
 use relight_core::light::{Normals, NormalsFrame};
 use relight_core::render::{Gloss, Surface};
 use relight_photo::export::{object_files, read_object};
+use relit_console::Console;
 
 use crate::inputs::{NormalsArgument, TransferArgument};
 
@@ -71,11 +72,11 @@ impl ObjectArguments {
     /// # Errors
     /// If a file cannot be read, the maps differ in size, a map has a value that is negative or not
     /// finite, or no pixel shows the object.
-    pub(super) fn read(&self) -> Result<Surface, Box<dyn Error>> {
+    pub(super) fn read(&self, console: Console) -> Result<Surface, Box<dyn Error>> {
         if let Some(path) = &self.object {
             return Ok(read_object(path)?.surface().clone());
         }
-        let normals = self.read_normals()?;
+        let normals = self.read_normals(console)?;
         let extent = normals.extent();
         let albedo = self.read_colour("albedo", &self.albedo, extent)?;
         let gloss = match &self.reflectance {
@@ -88,7 +89,7 @@ impl ObjectArguments {
         Ok(Surface::new(normals, albedo, gloss)?)
     }
 
-    fn read_normals(&self) -> Result<Normals, Box<dyn Error>> {
+    fn read_normals(&self, console: Console) -> Result<Normals, Box<dyn Error>> {
         let Some(path) = &self.normals else {
             return Err(
                 "give an object (object.relit, or a folder of relight turn or relight decompose), or --normals".into(),
@@ -103,7 +104,11 @@ impl ObjectArguments {
             Some(path) => {
                 let image = StoredImage::read(path)?;
                 check_extent("mask", image.planes.extent(), normals.extent())?;
-                normals.masked(&image.object_mask(path)?.0)?
+                let (mask, note) = image.object_mask(path)?;
+                if let Some(note) = note {
+                    console.warn(&format!("{}: {note}", path.display()));
+                }
+                normals.masked(&mask)?
             }
         };
         if normals.is_empty() {
@@ -211,7 +216,7 @@ mod tests {
     #[test]
     fn maps_are_read_in_the_frame_and_encoding_that_are_stated() {
         let folder = tempfile::tempdir().unwrap();
-        let surface = files(folder.path()).read().unwrap();
+        let surface = files(folder.path()).read(Console::new(false)).unwrap();
         let [x, y, z] = surface.normals().planes().pixel(0, 0);
         assert!(x.abs() < 1e-4 && (y + 0.6).abs() < 1e-4 && (z - 0.8).abs() < 1e-4);
         assert!((surface.albedo().planes().pixel(0, 0)[0] - 0.2159).abs() < 1e-3);
@@ -227,7 +232,7 @@ mod tests {
         let path = folder.path().join("smoothness.exr");
         write_exr(&path, &Planes::filled(Extent::new(4, 2), [333.0; 3])).unwrap();
         files.smoothness = Map::File(path);
-        let surface = files.read().unwrap();
+        let surface = files.read(Console::new(false)).unwrap();
         assert_eq!(surface.gloss().unwrap().smoothness().pixel(1, 1), [333.0]);
     }
 
@@ -244,7 +249,7 @@ mod tests {
                     "reflectance" => files.reflectance = Some(Map::File(path.clone())),
                     _ => files.smoothness = Map::File(path.clone()),
                 }
-                let error = files.read().unwrap_err().to_string();
+                let error = files.read(Console::new(false)).unwrap_err().to_string();
                 assert!(
                     error.contains("strange.exr") && error.contains(what),
                     "{error}"
@@ -261,7 +266,7 @@ mod tests {
         let mask = Planes::from_fn(Extent::new(4, 2), |x, _| [[0.0; 3], [1.0; 3]][x % 2]);
         write_png(&path, &mask, Depth::Eight).unwrap();
         files.mask = Some(path);
-        let surface = files.read().unwrap();
+        let surface = files.read(Console::new(false)).unwrap();
         assert_eq!(surface.normals().planes().pixel(0, 0), [0.0; 3]);
         assert_ne!(surface.normals().planes().pixel(1, 0), [0.0; 3]);
     }
@@ -273,7 +278,7 @@ mod tests {
         let path = folder.path().join("mask.png");
         write_png(&path, &Planes::zeros(Extent::new(4, 2)), Depth::Eight).unwrap();
         files.mask = Some(path.clone());
-        let error = files.read().unwrap_err().to_string();
+        let error = files.read(Console::new(false)).unwrap_err().to_string();
         assert!(error.contains("mask.png"), "{error}");
     }
 
@@ -284,7 +289,7 @@ mod tests {
         let path = folder.path().join("mask.png");
         write_png(&path, &Planes::zeros(Extent::new(5, 2)), Depth::Eight).unwrap();
         files.mask = Some(path);
-        let error = files.read().unwrap_err().to_string();
+        let error = files.read(Console::new(false)).unwrap_err().to_string();
         assert!(
             error.contains("5 x 2") && error.contains("4 x 2"),
             "{error}"
