@@ -107,9 +107,13 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ImageError>
         .or(figures.specular)
         .and_then(|gloss| Some((gloss.reflectance?, gloss.smoothness?)))
         .map(|(reflectance, smoothness)| Gloss::even(extent, [reflectance; 3], smoothness));
-    let confidence = match read_planes(&folder.join(CONFIDENCE)) {
-        Ok((map, _)) => Planes::from_planes(map.extent(), [map.plane(0).to_vec()])?,
-        Err(_) => Planes::filled(extent, [1.0]),
+    let confidence = folder.join(CONFIDENCE);
+    // Only turns have one.
+    let confidence = if confidence.exists() {
+        let (map, _) = read_planes(&confidence)?;
+        Planes::from_planes(map.extent(), [map.plane(0).to_vec()])?
+    } else {
+        Planes::filled(extent, [1.0])
     };
     let name = folder
         .file_name()
