@@ -102,6 +102,7 @@ impl RelightingRecipe {
 /// The inputs of all objects of a folder.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Origin {
+    software: String,
     #[serde(flatten)]
     recipe: RelightingRecipe,
     meshes: Vec<String>,
@@ -114,6 +115,7 @@ impl Origin {
 
     fn new(recipe: &RelightingRecipe, library: &Library) -> Self {
         Self {
+            software: format!("relight {}", env!("CARGO_PKG_VERSION")),
             // More objects can be added later.
             recipe: RelightingRecipe {
                 objects: 0,
