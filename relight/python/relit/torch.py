@@ -203,7 +203,10 @@ def _first_singular_vector(rows):
 class TurnBatches(torch.utils.data.IterableDataset):
     """Images, masks and the state behind them, batch by batch. Each worker of a loader draws its own batches, like a
     rank of its own. With `n` workers the state advances after every `n`-th batch: resuming from it may read up to `n - 1`
-    batches again, and misses none."""
+    batches again, and misses none.
+
+    A loop draws all samples up to the end of epoch `epochs - 1` (None: for ever), each epoch in an order of its own. A second
+    loop begins where the first began, unless `set_epoch` was called. At the end of an epoch ranks may differ by a batch."""
 
     def __init__(self, path, batch=12, *, linear=False, rank=0, world_size=1, epochs=1, **options):
         self._path, self._linear = path, linear
@@ -213,6 +216,12 @@ class TurnBatches(torch.utils.data.IterableDataset):
 
     def load_state_dict(self, state):
         self._cursor = Cursor.of(state)
+
+    def set_epoch(self, epoch):
+        """Lets the next loop draw this epoch alone; from the state that was loaded on, if that is in it."""
+        if self._cursor.epoch != epoch:
+            self._cursor = Cursor(epoch)
+        self._epochs = epoch + 1
 
     def __iter__(self):
         worker = torch.utils.data.get_worker_info()

@@ -67,6 +67,23 @@ def test_a_loader_of_torch_goes_on_where_it_stopped():
     assert torch.equal(rest[0][0], seen[2][0])
 
 
+def test_each_epoch_of_a_loop_has_an_order_of_its_own():
+    pytest.importorskip("torch", reason="torch is not installed")
+    from relit.torch import TurnBatches
+
+    batches = TurnBatches(DATA, seed=7)
+    epochs = []
+    for epoch in range(2):
+        batches.set_epoch(epoch)
+        epochs.append([images.double().sum().item() for images, _, _ in batches])
+    assert len(epochs[0]) == len(epochs[1])
+    assert epochs[0] != epochs[1]
+    state = [state for _, _, state in batches][0]
+    batches.load_state_dict(state)
+    batches.set_epoch(1)
+    assert [images.double().sum().item() for images, _, _ in batches] == epochs[1][1:]
+
+
 @pytest.mark.parametrize("workers", [2, 3])
 def test_no_batch_is_missed_from_the_state_of_any_worker(workers):
     torch = pytest.importorskip("torch", reason="torch is not installed")
