@@ -267,7 +267,7 @@ def _one_each(name, values, parts, count):
     if array.shape == shape[1:]:
         array = numpy.broadcast_to(array, shape)
     if array.shape != shape:
-        raise ValueError(f"{name} has values for {len(array)} of {count} objects: give one, or one for each")
+        raise ValueError(f"{name} has the shape {array.shape} for {count} objects: give one, or one for each")
     return array.tolist()
 
 
