@@ -37,8 +37,9 @@ pub(crate) fn probe_from_video(
         }
         number += 1;
     }
-    if done == 0 {
-        let why = format!("none of the turn's frames is among its {number}");
+    let wanted = angles.len() as u64;
+    if done < wanted {
+        let why = format!("of the turn's {wanted} frames, {done} are among its {number}");
         return Err(TurnError::other_video(&recording.video, &why));
     }
     Ok(ball)
