@@ -25,6 +25,8 @@ const THUMBNAIL_MEAN: f32 = 0.22;
 pub(super) struct StudioBackground {
     /// The name of its file.
     pub(super) name: String,
+    /// What a person may want to know of its file, as clauses.
+    pub(super) notes: Vec<String>,
     content: Content,
 }
 
@@ -76,9 +78,11 @@ impl StudioBackground {
     fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         let opened = OpenedFile::read(name, bytes)?;
         let (name, file) = (opened.name, opened.bytes);
-        let picture = UsableImage::new(opened.image).image.into_light();
+        let usable = UsableImage::new(opened.image);
+        let picture = usable.image.into_light();
         Ok(Self {
             name,
+            notes: usable.notes,
             content: Content::Photo(PhotoBackground {
                 file,
                 picture,
@@ -117,6 +121,7 @@ impl StudioBackground {
         };
         Ok(Self {
             name,
+            notes: Vec::new(),
             content: Content::Panorama(PanoramaBackground {
                 file,
                 panorama,

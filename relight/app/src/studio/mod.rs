@@ -240,7 +240,15 @@ impl Studio {
             (vec![pixels::shown(&picture)], boxes)
         };
         let Extent { width, height } = environment.extent;
-        let notes = renderer.notes();
+        let placed = scene.objects.iter().map(|placed| placed.object);
+        let objects_shown = placed.filter_map(|object| self.objects.0.get(&object));
+        let of_files = objects_shown
+            .map(|object| (&object.name, object.notes()))
+            .chain([(&background.name, background.notes.as_slice())]);
+        let mut notes: Vec<String> = of_files
+            .flat_map(|(name, notes)| notes.iter().map(move |note| format!("{name}: {note}")))
+            .collect();
+        notes.extend(renderer.notes());
         let says = json!({ "width": width, "height": height, "objects": objects, "notes": notes });
         Ok((says, parts))
     }

@@ -60,6 +60,14 @@ struct Cut {
 }
 
 impl StudioObject {
+    /// What a person may want to know of its file and its mask, as clauses.
+    pub(super) fn notes(&self) -> &[String] {
+        match &self.content {
+            Content::Photo(cut) => cut.photo.as_ref().map_or(&[], |photo| &photo.notes),
+            Content::Captured(_) => &[],
+        }
+    }
+
     /// Opens a file.
     ///
     /// # Errors
