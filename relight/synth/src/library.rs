@@ -152,6 +152,12 @@ impl Library {
         self.meshes.iter().map(|(name, _)| name.clone()).collect()
     }
 
+    /// What seeds draw from: the names of its meshes and panoramas, a line each.
+    pub fn identity(&self) -> String {
+        let names = self.mesh_names().into_iter().chain(self.panoramas.names());
+        names.map(|name| name + "\n").collect()
+    }
+
     /// The same without its meshes: all shapes are made.
     pub fn without_meshes(&self) -> Self {
         Self {

@@ -91,6 +91,20 @@ fn steps_lower_the_loss_in_both_precisions() {
 }
 
 #[test]
+fn a_gradient_that_is_no_number_changes_nothing() {
+    let model = model(decomposer(), ComputePrecision::Single);
+    let mut adam = Adam::new(&RunSettings::default(), model.parameters()).unwrap();
+    let before = model.weights().unwrap();
+    let picture = input(model.graph().input_channels());
+    let loss = model.forward(&picture).unwrap()[0].sum(None) * f64::INFINITY;
+    loss.backward();
+    let error = adam.step(model.parameters(), 1e-3).unwrap_err();
+    assert!(matches!(error, TrainError::Refused(_)), "{error:?}");
+    assert_eq!(model.weights().unwrap(), before);
+    assert_eq!(adam.steps(), 0);
+}
+
+#[test]
 fn a_run_that_was_saved_goes_on_to_the_same_losses() {
     tch::set_num_threads(1);
     let first = model(light_net(), ComputePrecision::Single);
@@ -528,6 +542,9 @@ impl EverySecondStep {
 impl TrainingTask for EverySecondStep {
     fn name(&self) -> &'static str {
         "every second step"
+    }
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(String::new())
     }
     fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
         Ok(())

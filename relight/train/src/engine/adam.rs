@@ -97,7 +97,7 @@ impl Adam {
     /// 1, they are scaled down to it first. Answers the norm that they had.
     ///
     /// # Errors
-    /// [`TrainError::Torch`].
+    /// [`TrainError::Refused`] if the norm is not finite: nothing is changed. [`TrainError::Torch`].
     pub fn step(
         &mut self,
         parameters: &BTreeMap<String, Tensor>,
@@ -112,6 +112,11 @@ impl Adam {
         learning_rate: f64,
     ) -> Result<f64, TrainError> {
         let norm = gradient_norm(parameters)?;
+        if !norm.is_finite() {
+            return Err(TrainError::Refused(format!(
+                "the run ends: the norm of its gradient is {norm}"
+            )));
+        }
         let shrink = if norm > MAX_GRAD_NORM {
             MAX_GRAD_NORM / norm
         } else {

@@ -15,7 +15,8 @@ const KEEP: f64 = 0.99;
 #[derive(Debug, Default)]
 pub(crate) struct DivergenceGuard {
     seen: u64,
-    loss: f64,
+    /// The running mean of the loss's size: it may be negative.
+    size: f64,
 }
 
 impl DivergenceGuard {
@@ -29,7 +30,7 @@ impl DivergenceGuard {
         losses: &BTreeMap<String, f64>,
     ) -> Result<(), TrainError> {
         let total = losses.get("loss").copied().unwrap_or(0.0);
-        let exploded = self.seen >= SETTLING && total > EXPLOSION * self.loss;
+        let exploded = self.seen >= SETTLING && total > EXPLOSION * self.size;
         // The sum of all is bad wherever one is: the one itself is named.
         let of_parts = losses.iter().filter(|(name, _)| *name != "loss");
         let mut named = of_parts.chain(losses.get_key_value("loss"));
@@ -41,7 +42,7 @@ impl DivergenceGuard {
         }
         self.seen += 1;
         let keep = KEEP.min(1.0 - 1.0 / self.seen as f64);
-        self.loss = keep * self.loss + (1.0 - keep) * total;
+        self.size = keep * self.size + (1.0 - keep) * total.abs();
         Ok(())
     }
 }
@@ -69,6 +70,14 @@ mod tests {
         let mut guard = DivergenceGuard::default();
         for number in 0..2000 {
             step(&mut guard, number, 3.0 / (1.0 + number as f64)).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_loss_may_become_negative() {
+        let mut guard = DivergenceGuard::default();
+        for number in 0..2000 {
+            step(&mut guard, number, 0.1 - f64::from(number as u32) / 1e4).unwrap();
         }
     }
 

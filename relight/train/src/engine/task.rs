@@ -32,9 +32,7 @@ pub trait TrainingTask {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    fn inputs(&self) -> Result<String, TrainError> {
-        Ok(String::new())
-    }
+    fn inputs(&self) -> Result<String, TrainError>;
 
     /// Takes this process's part of the work from now on. Called before the first step.
     ///

@@ -52,7 +52,7 @@ impl Trainable {
     /// One step along the gradients; their norm before they were scaled down to 1.
     ///
     /// # Errors
-    /// [`TrainError::Torch`].
+    /// As of [`Adam::step`].
     pub fn step(&mut self, learning_rate: f64) -> Result<f64, TrainError> {
         let norm = self.adam.step(self.model.parameters(), learning_rate)?;
         // In the first steps it forgets faster, so that it does not remember the initial weights.

@@ -8,8 +8,13 @@ use serde::de::DeserializeOwned;
 
 use crate::error::TrainError;
 
-/// Settings that a resumed run may change: they do not affect what it learns.
-const CHANGEABLE: [&str; 2] = ["run.log_every", "run.checkpoint_minutes"];
+/// Settings that a resumed run may change: those that do not affect what it learns, and the learning rate, without which a
+/// run that diverged could not go on.
+const CHANGEABLE: [&str; 3] = [
+    "run.learning_rate",
+    "run.log_every",
+    "run.checkpoint_minutes",
+];
 
 /// Reads settings from a TOML file; missing keys have their defaults, and unknown keys are errors.
 ///

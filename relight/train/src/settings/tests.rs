@@ -60,6 +60,9 @@ fn the_setting_that_differs_is_named() {
     let often = whole.replace("log_every = 20\n", "log_every = 5\n");
     assert_ne!(often, whole);
     assert_eq!(first_difference(&own, &often), None);
+    let slower = whole.replace("learning_rate = 0.001\n", "learning_rate = 0.0001\n");
+    assert_ne!(slower, whole);
+    assert_eq!(first_difference(&own, &slower), None);
     let unknown = whole.replace("[run]", "[run]\nspeed = 3");
     assert_eq!(first_difference(&own, &unknown).unwrap(), "run.speed");
 }

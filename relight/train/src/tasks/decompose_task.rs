@@ -53,6 +53,10 @@ impl TrainingTask for DecomposeTask {
         "decompose"
     }
 
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(self.photographs.library().identity())
+    }
+
     fn left_out(&self) -> &[SkippedFile] {
         self.photographs.left_out()
     }

@@ -154,7 +154,8 @@ impl TrainingTask for PaperTask {
     }
 
     fn inputs(&self) -> Result<String, TrainError> {
-        let mut inputs = self
+        let mut inputs = self.photographs.library().identity();
+        inputs += &self
             .turns
             .as_ref()
             .map_or(String::new(), TurnReader::identity);

@@ -117,6 +117,10 @@ impl TrainingTask for TurnNetworkTask {
         "turn"
     }
 
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(self.training.library().identity())
+    }
+
     fn left_out(&self) -> &[SkippedFile] {
         self.training.left_out()
     }

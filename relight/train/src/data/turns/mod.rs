@@ -116,6 +116,11 @@ impl Turns {
         self.0.close();
     }
 
+    /// What the views are of.
+    pub(crate) fn library(&self) -> &Library {
+        &self.0.library
+    }
+
     /// Unused files of the folders.
     pub(crate) fn left_out(&self) -> &[SkippedFile] {
         self.0.left_out()
