@@ -158,6 +158,8 @@ async function play(session) {
     const mine = shown;
     const detail = await describe(session.id);
     if (shown !== mine) return;
+    // Another page may have saved remarks since the list was made.
+    if (written() === remarks.saved && document.activeElement !== $("note")) showRemarks(detail);
     showSteps(detail, complain);
     Object.assign(shown, { times: detail.times_s, angles: detail.angles_deg });
     // What concerns the whole take stands below the verdict.
