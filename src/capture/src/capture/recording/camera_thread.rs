@@ -16,6 +16,8 @@ use relit_camera::{Camera, CameraError, Frame, FrameFault};
 
 /// Longest wait for a frame in one go: how late a stop is noticed.
 const FRAME_WAIT: Duration = Duration::from_millis(100);
+/// How long all frames that are queued at once may wait for places, such as those that a decoder needs before the turn.
+const BURST_WAIT: Duration = Duration::from_millis(200);
 /// How long the last frames of a turn may wait for a place in the queue.
 const LAST_WAIT: Duration = Duration::from_secs(4);
 
@@ -116,8 +118,14 @@ impl CameraThread {
     }
 
     fn enqueue_all(&mut self, frames: Vec<TurnFrame>) -> Result<(), EndReason> {
+        let wait = if frames.len() > 1 {
+            self.queue_wait.max(BURST_WAIT)
+        } else {
+            self.queue_wait
+        };
+        let until = Instant::now() + wait;
         for frame in frames {
-            self.enqueue(frame, Instant::now() + self.queue_wait)?;
+            self.enqueue(frame, until)?;
         }
         if self.trimmer.is_done() {
             Err(EndReason::Over)
@@ -138,7 +146,8 @@ impl CameraThread {
                     .map(|(at, fault)| Finding::Damaged(at, fault)),
                 Err(SendTimeoutError::Timeout(_)) => {
                     self.shared.lock().progress.overrun += 1;
-                    delivered.map(Finding::QueueFull)
+                    // Without those before it, the first cannot be decoded.
+                    Some(Finding::QueueFull(delivered.unwrap_or(0)))
                 }
                 Err(SendTimeoutError::Disconnected(_)) => {
                     return Err(EndReason::Failed(
