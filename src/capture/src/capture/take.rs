@@ -122,15 +122,17 @@ fn run_take(
     if let Some(light) = light.as_ref().filter(|light| !light.good) {
         recorded.add_note(light.found.clone());
     }
-    let take = recorded.finish(&angle, &control_faults)?;
-    if take.verdict != Verdict::Aborted {
-        context.note(light);
+    let take = recorded.finish(&angle, &control_faults);
+    if let Ok(take) = &take {
+        if take.verdict != Verdict::Aborted {
+            context.note(light);
+        }
+        context.end_take(take);
     }
-    context.end_take(&take);
     if let (Some(table), Some(finished)) = (equipment.table.as_ref(), finished) {
         repeatable &= unwind(table, finished, &clock, context).is_ok();
     }
-    Ok((take, repeatable))
+    Ok((take?, repeatable))
 }
 
 /// Whether a turn in this light tells normals and albedo, and trains networks on what changes.

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
+use super::report_recovered;
 use crate::capture::preflight::free_bytes;
 use crate::capture::turn::show_table;
 use crate::capture::{CaptureError, Equipment};
@@ -39,6 +40,8 @@ pub(super) struct Idle {
     counted: Option<(i64, u32)>,
     table_due_us: i64,
     search_due_us: i64,
+    /// Whether there may be interrupted sessions.
+    is_to_recover: bool,
 }
 
 impl Idle {
@@ -54,6 +57,7 @@ impl Idle {
             counted: None,
             table_due_us: now_us,
             search_due_us: now_us,
+            is_to_recover: false,
         }
     }
 
@@ -62,6 +66,11 @@ impl Idle {
         let now_us = self.clock.now_us();
         (self.last_frame_us, self.counted) = (now_us, None);
         (self.table_due_us, self.search_due_us) = (now_us, now_us);
+    }
+
+    /// Closes interrupted sessions as soon as their folder can be read.
+    pub(super) fn recover(&mut self) {
+        self.is_to_recover = true;
     }
 
     /// Waits a moment for a frame, and does what is due.
@@ -139,13 +148,18 @@ impl Idle {
     }
 
     /// Shows the free space of the folder of sessions, or that the folder is gone.
-    fn look_at_folder(&self, root: &Path) {
+    fn look_at_folder(&mut self, root: &Path) {
         let fault = match free_bytes(root) {
             Ok(free) => {
                 self.monitor.update(|state| {
                     state.free_bytes = free;
                     state.disk_fault = None;
                 });
+                if self.is_to_recover {
+                    // What cannot be listed is tried again.
+                    self.is_to_recover =
+                        report_recovered(root, &self.clock, &self.monitor).is_err();
+                }
                 return;
             }
             Err(error) => with_causes(&error),

@@ -90,6 +90,10 @@ impl Worker {
         };
         let captured = capture(&mut self.equipment, object, context);
         monitor.update(|state| state.session = None);
+        if captured.is_err() {
+            // Its session may not have been closed.
+            self.idle.recover();
+        }
         let summary = captured?.take;
         if let Some(reason) = summary.reason {
             let what = format!("{}: {reason}", summary.session);

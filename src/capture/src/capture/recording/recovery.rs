@@ -4,8 +4,9 @@
 //! The index is cut to the frames that the video holds, and kept as it was found under another name.
 //! The manifest says what happened. The frames get their angles from what the table had reported.
 
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::{fmt, fs};
+use std::{fmt, io};
 
 use super::error::RecordingError;
 use relit_data::causes::with_causes;
@@ -101,7 +102,7 @@ pub fn recover(root: &Path) -> Result<Vec<RecoveredSession>, RecordingError> {
 pub fn recover_session(folder: &Path) -> Result<RecoveryReport, RecordingError> {
     let session = InterruptedSession::open(folder)?;
     let entries = session.index().entries();
-    let frames = whole_frames(&session.video_path()).min(entries.len());
+    let frames = whole_frames(&session.video_path())?.min(entries.len());
     let seconds = match entries.get(..frames) {
         Some([first, .., last]) => last.t_us.saturating_sub(first.t_us) as f64 / 1e6,
         _ => 0.0,
@@ -124,16 +125,35 @@ pub fn recover_session(folder: &Path) -> Result<RecoveryReport, RecordingError> 
     Ok(saved)
 }
 
-/// How many frames from the first on are readable; 0 before the video exists.
-pub(super) fn whole_frames(path: &Path) -> usize {
-    let Ok(video) = Video::open(path) else {
-        return 0;
+/// How many frames from the first on are readable; 0 before the video exists, and where no video was begun in its file.
+///
+/// # Errors
+/// If the file cannot be read now: then nobody knows.
+pub(super) fn whole_frames(path: &Path) -> Result<usize, RecordingError> {
+    let unread = |source| RecordingError::System {
+        what: format!(
+            "{} could not be read: check its disk; the session is recovered at the next start",
+            path.display()
+        ),
+        source,
+    };
+    let mut file = match File::open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        opened => opened.map_err(unread)?,
+    };
+    let video = match Video::open(path) {
+        Ok(video) => video,
+        Err(error) if path.to_str().is_none() => return Err(error.into()),
+        Err(_) => {
+            io::copy(&mut file, &mut io::sink()).map_err(unread)?;
+            return Ok(0);
+        }
     };
     let all = video.frames().len();
     let decodes = |number: &usize| video.frame(*number as u64).is_ok();
     // A damaged frame in the middle is kept: only damaged ones at the end are left out.
     let last = (0..all).rev().take(TRIED_AT_END).find(decodes);
-    last.map_or(all.saturating_sub(TRIED_AT_END), |last| last + 1)
+    Ok(last.map_or(all.saturating_sub(TRIED_AT_END), |last| last + 1))
 }
 
 /// Reads a session with frames back as any user of it would.

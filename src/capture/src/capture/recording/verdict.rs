@@ -68,7 +68,9 @@ impl FinishedRecording {
         if self.writer.failure.is_some() {
             // The video could not be closed: what the disk has of it decides.
             let session = &mut self.writer.session;
-            session.truncate(whole_frames(&session.video_path()));
+            if let Ok(frames) = whole_frames(&session.video_path()) {
+                session.truncate(frames);
+            }
             let frames = session.index().entries().len();
             self.writer.delivered.truncate(frames);
         }
