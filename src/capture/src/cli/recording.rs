@@ -52,6 +52,11 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
 /// Makes the folder of sessions; one that stays empty is removed at the end.
 pub(crate) fn make_root(settings: &Settings) -> Result<CreatedFolder, CaptureError> {
     let root = settings.root.display().to_string();
+    if settings.root.to_str().is_none() {
+        return Err(CaptureError::Refused(format!(
+            "the folder {root} has a name that is not plain text, and videos in it cannot be read: give another one"
+        )));
+    }
     CreatedFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
 }
 
@@ -82,6 +87,15 @@ fn report_recovered(console: Console, settings: &Settings) -> Result<(), Capture
     Ok(())
 }
 
+/// Says that the work is over, also where it panics: the scope waits for the other thread.
+struct Over<'a>(&'a AtomicBool);
+
+impl Drop for Over<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Runs `work` while another thread reports what the monitor shows.
 fn while_reporting<T>(console: Console, monitor: &Monitor, work: impl FnOnce() -> T) -> T {
     let over = AtomicBool::new(false);
@@ -94,9 +108,8 @@ fn while_reporting<T>(console: Console, monitor: &Monitor, work: impl FnOnce() -
             reporter.report(&monitor.state());
             reporter.bar.finish_and_clear();
         });
-        let done = work();
-        over.store(true, Ordering::Relaxed);
-        done
+        let _over = Over(&over);
+        work()
     })
 }
 
