@@ -1,16 +1,15 @@
 //! `relit-capture devices`: what there is, for a person or a machine.
 
-use std::process::ExitCode;
-
 use relit_camera::{self as camera, Control, ControlKind, DeviceInfo};
 use relit_data::causes::with_causes;
 use relit_data::clock::Clock;
 use relit_turntable::{TurntableError, find_serial};
 use serde_json::{Value, json};
 
+use relit_capture::capture::CaptureError;
 use relit_console::{Console, Event, Outcome};
 
-pub(crate) fn run(console: Console) -> ExitCode {
+pub(crate) fn run(console: Console) -> Result<Outcome, CaptureError> {
     let cameras = camera::list();
     if cameras.is_empty() {
         console.warn("no camera was found: plug one in, or replay a recording (replay:PATH)");
@@ -19,7 +18,7 @@ pub(crate) fn run(console: Console) -> ExitCode {
         report_camera(console, camera);
     }
     report_turntable(console);
-    Outcome::Success.into()
+    Ok(Outcome::Success)
 }
 
 fn report_camera(console: Console, info: &DeviceInfo) {

@@ -23,7 +23,7 @@ pub(crate) fn run() -> ExitCode {
     let line = CommandLine::parse();
     let console = line.console.console();
     match line.verb {
-        Verb::Devices => devices::run(console),
+        Verb::Devices => console.finish(devices::run(console)),
         Verb::Record(record) => console.finish(recording::run(console, *record)),
         Verb::Calibrate(asked) => console.finish(calibrating::run(console, *asked)),
         Verb::Serve(serve) => console.finish(serving::run(console, *serve)),
