@@ -141,7 +141,14 @@ impl Shared {
 
     /// Closes the editor once its mask is accepted or discarded, or nobody has used it for long.
     pub(super) fn look_after_editor(&self) {
-        let over = |open: &mut OpenEditor| open.editor.is_over() || open.used.elapsed() >= UNUSED;
+        let is_busy = is_busy(&self.monitor);
+        let over = |open: &mut OpenEditor| {
+            // It continues after a capture, however long that takes.
+            if is_busy {
+                open.used = Instant::now();
+            }
+            open.editor.is_over() || open.used.elapsed() >= UNUSED
+        };
         let closed = self.editor().take_if(over);
         if let Some(closed) = closed
             && closed.editor.accepted().is_some()
