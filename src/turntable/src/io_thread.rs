@@ -201,7 +201,13 @@ fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBo
             // The time at which the read began: this thread may have been paused since, and bytes
             // that arrived during the pause must not count as silence.
             Ok(0) => supervisor.on_time(asked_us),
-            Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
+            Ok(count) => {
+                supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default());
+                // Noise on the line must not keep the waiting for answers from ending.
+                if count < buffer.len() {
+                    supervisor.on_time(asked_us);
+                }
+            }
             Err(error) => supervisor.close(with_causes(&error)),
         }
         let (changed, gone) = (supervisor.take_changed(), supervisor.closed().is_some());
