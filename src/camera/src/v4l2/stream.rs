@@ -161,12 +161,14 @@ impl Stream {
     }
 }
 
-/// A frame's time stamp: the driver's if it uses the monotonic clock, otherwise the arrival.
+/// A frame's time stamp: the driver's if it uses the monotonic clock, otherwise the arrival. No frame is taken after it has
+/// arrived.
 fn stamp(flags: u32, time: sys::timeval, arrived_us: i64) -> (i64, FrameClock) {
     let t_us = time.tv_sec.saturating_mul(1_000_000);
     match flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK {
         sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC => {
-            (t_us.saturating_add(time.tv_usec), FrameClock::Driver)
+            let t_us = t_us.saturating_add(time.tv_usec);
+            (t_us.min(arrived_us), FrameClock::Driver)
         }
         _ => (arrived_us, FrameClock::Host),
     }
@@ -183,12 +185,14 @@ mod tests {
             tv_usec: 5,
         };
         let monotonic = sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-        let at = |flags| stamp(flags, time, 9);
+        let arrived_us = 3_000_000;
+        let at = |flags| stamp(flags, time, arrived_us);
         assert_eq!(at(monotonic), (2_000_005, FrameClock::Driver));
         let exposure = monotonic | sys::V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
         assert_eq!(at(exposure), (2_000_005, FrameClock::Driver));
         for other in [0, sys::V4L2_BUF_FLAG_TIMESTAMP_COPY] {
-            assert_eq!(at(other), (9, FrameClock::Host));
+            assert_eq!(at(other), (arrived_us, FrameClock::Host));
         }
+        assert_eq!(stamp(monotonic, time, 9), (9, FrameClock::Driver));
     }
 }
