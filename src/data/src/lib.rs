@@ -150,11 +150,12 @@
 //! dataset.write(folder.path())?;
 //!
 //! // Check everything that was written.
-//! let report = verify(folder.path(), &|_done, _total| {})?;
+//! drop(folder);
+//! let report = verify(root.path(), &|_done, _total| {})?;
 //! assert_eq!((report.samples, report.problems), (12, Vec::new()));
 //!
 //! // Read the samples. Any 12 in a row cover the whole turn.
-//! let shard = File::open(folder.path().join(&dataset.shards[0].file))?;
+//! let shard = File::open(root.path().join(&dataset.shards[0].file))?;
 //! for sample in ShardReader::new(BufReader::new(shard)) {
 //!     let sample = sample?;
 //!     let image = decode_rgb(sample.member("png").ok_or("no image")?)?;

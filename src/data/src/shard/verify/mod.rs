@@ -13,6 +13,7 @@ use std::path::Path;
 
 use super::ShardError;
 use super::dataset::Dataset;
+use super::output;
 use super::record::FrameRecord;
 use super::settings::Layout;
 use session::{Progress, SessionCheck, ShardContents};
@@ -63,12 +64,13 @@ impl fmt::Display for VerifyProblem {
 ///
 /// # Errors
 /// Only without a data set to check: [`ShardError::NoDataset`], [`ShardError::Description`],
-/// [`ShardError::Refused`], or [`ShardError::Io`] on the folder. Everything else is a
+/// [`ShardError::Refused`], [`ShardError::Locked`] while it is being written, or [`ShardError::Io`] on the folder. Everything else is a
 /// [`VerifyProblem`].
 pub fn verify(
     out: &Path,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<VerifyReport, ShardError> {
+    let _lock = output::lock_for_reading(out)?;
     let dataset = Dataset::read(out)?;
     let mut problems = listing::check(out, &dataset)?;
     let samples_of = |session: &super::SessionEntry| u64::from(session.samples);
