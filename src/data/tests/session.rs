@@ -10,7 +10,7 @@ use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::{
     CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
     SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, beside_recordings, clips,
-    object_of, recordings,
+    hidden_recordings, object_of, recordings,
 };
 use tempfile::TempDir;
 
@@ -323,6 +323,30 @@ fn a_folder_of_clips_is_one_recording_each_and_with_a_single_video_it_may_be_eit
     assert_eq!(clips(root.path()).unwrap(), [at("a.mp4"), at("b.MOV")]);
     let beside = beside_recordings(root.path()).unwrap();
     assert_eq!(beside, [at("empty"), at("notes.txt")]);
+}
+
+#[test]
+fn a_folder_that_stands_for_its_video_does_not_hide_folders_of_recordings() {
+    let (root, _) = whole();
+    let folder = root.path().join("clip");
+    let inner = folder.join("monday");
+    fs::create_dir_all(inner.join("turn")).unwrap();
+    fs::create_dir(folder.join("notes")).unwrap();
+    fs::write(folder.join("a.mp4"), b"").unwrap();
+    assert_eq!(hidden_recordings(&folder), [] as [&Path; 0]);
+    fs::write(inner.join("turn/b.mp4"), b"").unwrap();
+    assert_eq!(recordings(&folder).unwrap(), std::slice::from_ref(&folder));
+    assert_eq!(hidden_recordings(&folder), [inner]);
+}
+
+#[test]
+fn a_link_to_a_video_that_leads_nowhere_is_a_recording_that_cannot_be_opened() {
+    let root = tempfile::tempdir().unwrap();
+    let [lost, whole] = ["lost.mp4", "whole.mp4"].map(|name| root.path().join(name));
+    fs::write(&whole, b"").unwrap();
+    std::os::unix::fs::symlink(root.path().join("nowhere"), &lost).unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [lost.clone(), whole]);
+    refused(Recording::open(&lost), "lost.mp4");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use relit_data::file_names::folded;
 use relit_data::session::{
-    self, SessionError, beside_recordings, clips, recording_name, recordings,
+    self, SessionError, beside_recordings, clips, hidden_recordings, recording_name, recordings,
 };
 use relit_data::shard::{Dataset, OutputFolder};
 
@@ -122,6 +122,16 @@ pub(super) fn find(
                         RecordingOutcome::LeftOut(ExtractError::Refused(what)),
                     );
                 }
+            }
+        }
+        if inside.is_ok()
+            && !is_folder_of_recordings
+            && options.task.is_none_or(|task| task.takes(0))
+        {
+            for path in hidden_recordings(input) {
+                let what = "it is beside a video for which its folder stands: give it by itself";
+                let error = ExtractError::Refused(what.to_owned());
+                report(&path, RecordingOutcome::LeftOut(error));
             }
         }
         match inside {

@@ -7,7 +7,8 @@ use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 use relit_data::file_names::folded;
 use relit_data::session::{
-    MANIFEST_FILE, MASK_SUFFIX, SessionError, beside_recordings, clips, mask_stem, recordings,
+    MANIFEST_FILE, MASK_SUFFIX, SessionError, beside_recordings, clips, hidden_recordings,
+    mask_stem, recordings,
 };
 use relit_data::still::is_named;
 
@@ -91,7 +92,7 @@ impl MaskInputs {
             recordings(input)
         };
         let (inside, beside) = match inside {
-            Ok(inside) if inside == [input] => (inside, Vec::new()),
+            Ok(inside) if inside == [input] => (inside, hidden_recordings(input)),
             Ok(inside) => (inside, beside_recordings(input)?),
             Err(_) => match photographs(input)? {
                 (photographs, _) if photographs.is_empty() => return Err(nothing_to_mask(input)),

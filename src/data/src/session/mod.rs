@@ -34,7 +34,9 @@ pub use manifest::{
     TurntableFacts, VideoFacts, object_of,
 };
 pub use masks::{MASK_SUFFIX, mask_in, mask_stem};
-pub use recording::{Notice, Recording, beside_recordings, clips, recording_name, recordings};
+pub use recording::{
+    Notice, Recording, beside_recordings, clips, hidden_recordings, recording_name, recordings,
+};
 pub use writer::SessionWriter;
 
 /// Name of the manifest in a session folder.

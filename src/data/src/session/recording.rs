@@ -236,6 +236,18 @@ pub fn beside_recordings(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     Ok(beside)
 }
 
+/// Folders of recordings in a folder that [`recordings`] takes for the one video in it.
+pub fn hidden_recordings(folder: &Path) -> Vec<PathBuf> {
+    let is_recording = !folder.is_dir() || folder.join(MANIFEST_FILE).exists();
+    let beside = if is_recording {
+        Vec::new()
+    } else {
+        beside_recordings(folder).unwrap_or_default()
+    };
+    let holds_recordings = |path: &PathBuf| path.is_dir() && recordings(path).is_ok();
+    beside.into_iter().filter(holds_recordings).collect()
+}
+
 fn not_there(path: &Path) -> SessionError {
     SessionError::Unusable(format!(
         "{} does not exist: give a session folder, a folder of sessions, or a video file",
@@ -263,7 +275,8 @@ fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let mut videos = Vec::new();
     for entry in fs::read_dir(folder).map_err(SessionError::io(folder, "listed"))? {
         let path = entry.map_err(SessionError::io(folder, "listed"))?.path();
-        if is_video(&path) && path.is_file() {
+        // A link that leads nowhere is a video, too: opening it says so.
+        if is_video(&path) && !path.is_dir() {
             videos.push(path);
         }
     }

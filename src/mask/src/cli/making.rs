@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use relit_console::{Console, Done, Event, Outcome, RunTotals};
 use relit_data::counts::count_of;
-use relit_data::session::recording_name;
+use relit_data::session::{recording_name, recordings};
 use relit_data::still::is_named;
 use relit_mask::{MaskInputs, MaskOutput, MaskingError, edit, make_mask};
 use relit_web::Announcement;
@@ -65,6 +65,8 @@ fn says_left_out(inputs: &MaskInputs, console: Console) -> Outcome {
         let input = path.to_string_lossy().into_owned();
         let message = if is_named(path) {
             "it is a photograph beside recordings: name it as an input of its own"
+        } else if recordings(path).is_ok() {
+            "it holds recordings, beside a video for which its folder stands: name it as an input of its own"
         } else {
             "it is not a session, a video or a photograph"
         };
