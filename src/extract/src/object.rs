@@ -3,14 +3,12 @@
 use std::path::Path;
 
 use image::GrayImage;
-use image::imageops::{FilterType, resize};
 
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskPicture, bounding_box, size_hint};
+use relit_data::mask::{VideoMask, bounding_box};
 use relit_data::session::{MASK_FILE, Recording, mask_in, mask_stem};
 use relit_data::shard::Digest;
-use relit_data::still;
 
 use super::ExtractError;
 
@@ -65,43 +63,18 @@ impl ObjectMask {
                 ));
             }
         };
-        let bytes = std::fs::read(&path).map_err(ExtractError::io("read", &path))?;
         let of_this_mask =
             |what: String| ExtractError::Refused(format!("the mask {} {what}", path.display()));
-        let picture = still::decode(&bytes).map_err(|error| of_this_mask(with_causes(&error)))?;
-        let picture = MaskPicture::from_image(&picture);
-        let size = picture.size();
-        if size != frame && size != stored {
-            let hint = size_hint(size, frame).unwrap_or("make the mask on a frame of this video");
-            return Err(of_this_mask(format!(
-                "is {} x {} pixels and the frames are {} x {}: {hint}",
-                size.0, size.1, frame.0, frame.1
-            )));
-        }
-        let object = picture
-            .object()
-            .map_err(|fault| of_this_mask(fault.to_string()))?;
-        let levels = object
-            .inside
-            .iter()
-            .map(|&inside| if inside { 255 } else { 0 });
-        let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
-        if size != frame {
-            image = resize(&image, frame.0, frame.1, FilterType::Triangle);
-            for level in image.iter_mut() {
-                *level = if *level < 128 { 0 } else { 255 };
-            }
-        }
-        let blake3 = Digest::hash(&bytes);
-        let note = object
-            .note(size.0)
-            .map(|note| format!("the mask {} {note}", path.display()));
+        let mask = VideoMask::read(&path, frame, stored);
+        let mask = mask.map_err(|fault| of_this_mask(with_causes(&fault)))?;
+        let note = mask.note;
         Ok(Self {
-            bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, frame.0, frame.1)),
-            frame: frame_of(&path, &blake3),
-            image,
-            blake3,
-            note,
+            bounding_box: bounding_box(&mask.image)
+                .unwrap_or_else(|| Rect::new(0, 0, frame.0, frame.1)),
+            frame: mask.frame,
+            image: mask.image,
+            blake3: Digest::hash(&mask.bytes),
+            note: note.map(|note| format!("the mask {} {note}", path.display())),
         })
     }
 
@@ -131,31 +104,4 @@ fn no_mask_in(masks: &Path, recording: &Recording) -> ExtractError {
         mask_stem(named_after).to_string_lossy(),
         masks.display()
     ))
-}
-
-/// The frame on which a mask was made, by its record (`mask.json` of `mask.png`). A record that is
-/// damaged, or that of another mask, says nothing.
-fn frame_of(mask: &Path, blake3: &Digest) -> Option<u64> {
-    let record = std::fs::read(mask.with_extension("json")).ok()?;
-    let record: serde_json::Value = serde_json::from_slice(&record).ok()?;
-    let of_this_mask = record["result"]["mask_blake3"].as_str()? == blake3.to_string();
-    record["source"]["frame"].as_u64().filter(|_| of_this_mask)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_frame_of_a_mask_is_read_from_its_own_record_only() {
-        let folder = tempfile::tempdir().unwrap();
-        let mask = folder.path().join("m.png");
-        let blake3 = Digest::hash(b"mask");
-        assert_eq!(frame_of(&mask, &blake3), None);
-        let record =
-            format!(r#"{{"source": {{"frame": 7}}, "result": {{"mask_blake3": "{blake3}"}}}}"#);
-        std::fs::write(mask.with_extension("json"), record).unwrap();
-        assert_eq!(frame_of(&mask, &blake3), Some(7));
-        assert_eq!(frame_of(&mask, &Digest::hash(b"another")), None);
-    }
 }

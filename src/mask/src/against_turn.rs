@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
-use image::{GrayImage, RgbImage};
-use relit_data::mask::{MaskPicture, size_hint};
+use relit_data::causes::with_causes;
+use relit_data::mask::VideoMask;
 use relit_data::session::{MASK_FILE, Recording, mask_in, mask_stem};
 use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, TURN_FRAMES, preview};
 use relit_video::Video;
 use serde::Serialize;
 
-use super::files::{read_if_exists, write};
+use super::files::write;
 use super::sampling::sampled;
-use super::{MaskFiles, MaskRecord, MaskingError};
+use super::{MaskFiles, MaskingError};
 
 /// The schema of the record.
 const CHECK_SCHEMA: &str = "relit.mask-check/1";
@@ -119,17 +120,22 @@ fn check_recording(
     mask: Option<&Path>,
 ) -> Result<(MaskReport, PathBuf), MaskingError> {
     let files = MaskFiles::from_mask_path(&mask_of(recording, mask)?)?;
-    let (picture, png) = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
-    check_size(&files.mask, picture.size(), &video)?;
-    let image = object_of(&files.mask, &picture)?;
-    let frame = video.frame(source_frame(&files, &video)?)?;
+    let facts = video.facts();
+    let mask = VideoMask::read(&files.mask, (facts.width, facts.height), facts.stored_size);
+    let mask = mask.map_err(|fault| {
+        let why = format!("it {}", with_causes(&fault));
+        MaskingError::unusable("mask", &files.mask, &why)
+    })?;
+    let (image, frames) = (mask.image, video.frames().len() as u64);
+    let made_on = mask.frame.filter(|&frame| frame < frames);
+    let frame = video.frame(made_on.unwrap_or(0))?;
     let turn = sampled(&video, image.dimensions(), &video.spread(TURN_FRAMES))?;
     let check = MaskCheck::new(&image, &turn.statistics)?;
     let report = MaskReport::from_shape(check.shape(&frame, Effort::Fine)?);
     let page = page(&recording.id, &report, &preview(&frame, &image))?;
     let [page_file, record_file] = check_files(&files, recording);
-    let record = record(&recording.id, &report, &png, &record_file)?;
+    let record = record(&recording.id, &report, &mask.bytes, &record_file)?;
     write(&page_file, page.as_bytes())?;
     write(&record_file, &record)?;
     Ok((report, page_file))
@@ -147,51 +153,6 @@ fn mask_of(recording: &Recording, named: Option<&Path>) -> Result<PathBuf, Maski
         Some(file) => Ok(file.to_owned()),
         None => Ok(recording.folder.clone().unwrap_or_default().join(MASK_FILE)),
     }
-}
-
-/// The picture of the mask, and its file.
-fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
-    let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let image = relit_data::still::decode(&bytes);
-    let image = image.map_err(|error| MaskingError::unusable("mask", path, &error))?;
-    Ok((MaskPicture::from_image(&image), bytes))
-}
-
-/// What the mask marks: 255, and 0 elsewhere.
-fn object_of(path: &Path, picture: &MaskPicture) -> Result<GrayImage, MaskingError> {
-    let object = picture.object();
-    let object =
-        object.map_err(|fault| MaskingError::unusable("mask", path, &format!("it {fault}")))?;
-    let levels = object.inside.iter().map(|&inside| u8::from(inside) * 255);
-    let (width, height) = picture.size();
-    Ok(GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default())
-}
-
-fn check_size(path: &Path, mask: (u32, u32), video: &Video) -> Result<(), MaskingError> {
-    let facts = video.facts();
-    let (width, height) = mask;
-    if (width, height) == (facts.width, facts.height) {
-        return Ok(());
-    }
-    let hint = size_hint((width, height), (facts.width, facts.height));
-    let why = format!(
-        "it is {width} x {height} pixels and the frames are {} x {}{}",
-        facts.width,
-        facts.height,
-        hint.map(|hint| format!("; {hint}")).unwrap_or_default()
-    );
-    Err(MaskingError::unusable("mask", path, &why))
-}
-
-/// The frame on which the mask was made, if its record says so and the video has it.
-fn source_frame(files: &MaskFiles, video: &Video) -> Result<u64, MaskingError> {
-    let record = read_if_exists(&files.record)?;
-    let record = record.and_then(|bytes| MaskRecord::from_json(&bytes).ok());
-    let frame = record.map_or(0, |record| record.source.frame);
-    Ok(match usize::try_from(frame) {
-        Ok(at) if at < video.frames().len() => frame,
-        _ => 0,
-    })
 }
 
 /// The page and the record: `NAME-check.html` and `NAME-check.json` in the folder of a recorded session, so that one mask can be

@@ -10,15 +10,19 @@
 //! A photograph, a picture of several labels, and one that marks nothing are refused: [`MaskFault`]. One that marks the
 //! whole border may be inverted: [`ObjectPixels::note`] says so.
 //!
-//! Knows pixels only: files are decoded by others.
+//! `file` reads the mask of a video; all else knows pixels only.
 
 mod colours;
 mod fault;
+#[cfg(all(feature = "files", feature = "still"))]
+mod file;
 mod levels;
 mod picture;
 
 pub use fault::MaskFault;
 use fault::several;
+#[cfg(all(feature = "files", feature = "still"))]
+pub use file::{VideoMask, VideoMaskFault};
 pub use picture::MaskPicture;
 
 use image::GrayImage;
