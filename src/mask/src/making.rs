@@ -11,7 +11,7 @@ use relit_video::Video;
 
 use super::earlier::{check_same_input, keep_recipe, with_strokes};
 use super::engine::cut_by_opencv;
-use super::files::{check_replaceable, make_folder, write};
+use super::files::{check_replaceable, make_folder, write_all};
 use super::request::{Recipe, TurnRequest};
 use super::sampling::{SampledTurn, read_frame, read_turn, same_image};
 use super::{
@@ -175,9 +175,11 @@ pub(super) fn write_files(
     let json = record.to_json();
     let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
     keep_recipe(files, &record)?;
-    write(&files.record, &json)?;
-    write(&files.preview, &preview_png)?;
-    write(&files.mask, &png)?;
+    write_all(&[
+        (&files.record, &json),
+        (&files.preview, &preview_png),
+        (&files.mask, &png),
+    ])?;
     Ok(record)
 }
 
