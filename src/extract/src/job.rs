@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::mem::take;
 use std::path::Path;
+use std::time::SystemTime;
 
 use image::RgbImage;
 use image::imageops::thumbnail;
@@ -45,6 +46,8 @@ const MAX_CROP_PIXELS: u64 = 1 << 26;
 pub(super) struct Job {
     recording: Recording,
     video: Video,
+    /// Length and time of the video's file when it was opened.
+    video_file: (u64, SystemTime),
     input: SourceVideo,
     mask: ObjectMask,
     notices: Vec<Notice>,
@@ -54,6 +57,7 @@ impl Job {
     /// Opens recording, video and mask, and checks that they belong together.
     pub(super) fn open(path: &Path, options: &ExtractOptions) -> Result<Self, ExtractError> {
         let recording = Recording::open(path)?;
+        let video_file = length_and_time(&recording.video)?;
         let video = Video::open(&recording.video)?;
         let size = (video.facts().width, video.facts().height);
         let stored = video.facts().stored_size;
@@ -78,6 +82,7 @@ impl Job {
         Ok(Self {
             recording,
             video,
+            video_file,
             input,
             mask,
             notices,
@@ -195,8 +200,14 @@ impl Job {
                     }
                     Ok(())
                 })?;
-                assignments =
-                    plan.replace(&newly_lost.iter().map(|frame| frame.number).collect())?;
+                // Where those that took the place of others are lost, too, so is what depends on them.
+                let doubtful: Vec<_> = newly_lost
+                    .iter()
+                    .filter(|_| !lost.is_empty())
+                    .map(|frame| self.video.until_next_key(frame.number))
+                    .collect();
+                let numbers = newly_lost.iter().map(|frame| frame.number).collect();
+                assignments = plan.replace(&numbers, &doubtful)?;
                 lost.extend(newly_lost);
                 if assignments.is_empty() && !all_known {
                     all_known = true;
@@ -239,6 +250,7 @@ impl Job {
         let quality = quality.with_mask(misfit);
         // Whatever can fail is done before the shard of an earlier run is replaced.
         let page = self.page(options, &records, &thumbnails, &notices, &quality)?;
+        self.check_video_file()?;
         let files = writer.finish()?;
         let report = folder.write(&format!("{}.html", self.id()), page.as_bytes())?;
         let count = |is: fn(&FrameRecord) -> bool| records.iter().filter(|r| is(r)).count() as u32;
@@ -268,6 +280,18 @@ impl Job {
             report: Some(report),
         };
         Ok((entry, files.shards))
+    }
+
+    /// That what was read is the video whose hash is recorded.
+    fn check_video_file(&self) -> Result<(), ExtractError> {
+        let video = &self.recording.video;
+        if length_and_time(video)? == self.video_file {
+            return Ok(());
+        }
+        Err(ExtractError::Refused(format!(
+            "{} was changed while it was read: extract it again",
+            video.display()
+        )))
     }
 
     fn is_aborted(&self) -> bool {
@@ -339,7 +363,8 @@ impl Job {
     ) -> Result<Option<pipeline::Align>, ExtractError> {
         let chosen = &plan.selection.frames;
         let keys = self.video.key_frames();
-        let (frames, reference) = frames_to_align(chosen, keys, self.mask.frame);
+        let of_mask = self.mask.frame.filter(|&frame| frame < self.input.frames);
+        let (frames, reference) = frames_to_align(chosen, keys, of_mask);
         let mut samples = stage.align_samples(&frames, pool)?;
         if !frames.contains(&reference) {
             samples.extend(stage.sample_by_index(reference));
@@ -564,6 +589,12 @@ fn index_digest(recording: &Recording) -> Result<Option<Digest>, ExtractError> {
         (Some(_), Some(folder)) => Ok(Some(digest(&folder.join(INDEX_FILE))?.1)),
         _ => Ok(None),
     }
+}
+
+fn length_and_time(path: &Path) -> Result<(u64, SystemTime), ExtractError> {
+    let metadata = std::fs::metadata(path).map_err(ExtractError::io("read", path))?;
+    let time = metadata.modified();
+    Ok((metadata.len(), time.unwrap_or(SystemTime::UNIX_EPOCH)))
 }
 
 fn digest(path: &Path) -> Result<(u64, Digest), ExtractError> {

@@ -193,6 +193,12 @@ impl Stage<'_> {
                     "frame {number}: {fault}; convert the video to another pixel format, for example with ffmpeg"
                 )));
             }
+            // So do all that follow it.
+            Err(fault @ DecodeFault::Unread) => {
+                return Err(ExtractError::Refused(format!(
+                    "frame {number}: {fault}: is it being written, or is its disk gone? extract it again"
+                )));
+            }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
         }
         if !inside {

@@ -1,6 +1,7 @@
 //! Which source frame is used for which samples.
 
 use std::collections::{BTreeMap, HashSet};
+use std::ops::Range;
 
 use relit_data::session::FrameIndex;
 use relit_data::shard::SamplingBasis;
@@ -126,13 +127,21 @@ impl Plan {
     }
 
     /// Chooses again, without the frames `lost`, for the samples to which these were assigned. The
-    /// other samples keep their frames. Returns the new assignments; none if nothing is lost.
-    pub(super) fn replace(&mut self, lost: &HashSet<u64>) -> Result<Assignments, ExtractError> {
+    /// other samples keep their frames. Frames that were not tried are left out, too, if they are `doubtful`. Returns the new
+    /// assignments; none if nothing is lost.
+    pub(super) fn replace(
+        &mut self,
+        lost: &HashSet<u64>,
+        doubtful: &[Range<u64>],
+    ) -> Result<Assignments, ExtractError> {
         if lost.is_empty() {
             return Ok(Assignments::new());
         }
-        self.candidates
-            .retain(|candidate| !lost.contains(&candidate.frame));
+        let used = &self.used;
+        let is_doubtful = |frame: &u64| doubtful.iter().any(|range| range.contains(frame));
+        self.candidates.retain(|Candidate { frame, .. }| {
+            !lost.contains(frame) && (used.contains(frame) || !is_doubtful(frame))
+        });
         let again = Selection::among(&self.candidates, self.selection.span(), self.samples)?;
         let mut chosen = Vec::new();
         let new = again.frames.iter().zip(&again.distances);

@@ -195,6 +195,9 @@ pub enum DecodeFault {
     /// The pixel format cannot be converted to RGB.
     #[error("its pixel format {0} cannot be converted to RGB")]
     PixelFormat(String),
+    /// The file ends before it, although it held it when it was opened.
+    #[error("the video ends before it, although it had it when it was opened")]
+    Unread,
 }
 
 impl DecodeFault {

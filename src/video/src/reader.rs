@@ -142,10 +142,16 @@ impl<'a> Reader<'a> {
         if let Some(chain) = &mut self.chain {
             chain.flush(self.track, &mut self.wanted, &mut self.ready);
         }
+        // In a file that was decoded to count its frames, packets have no numbers.
+        let fault = if self.packets < self.track.number_of_packet.len() {
+            DecodeFault::Unread
+        } else {
+            DecodeFault::no_picture()
+        };
         for number in self.wanted.rest() {
             self.ready.push_back(Pending {
                 number,
-                state: State::Lost(DecodeFault::no_picture()),
+                state: State::Lost(fault.clone()),
             });
         }
     }

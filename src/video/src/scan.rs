@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::BufReader;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use ffmpeg_next::codec::Parameters;
@@ -92,7 +93,7 @@ impl Video {
             };
             (ordered, numbering)
         } else {
-            let survey = Survey::decode(path, index, &opened.codec)?;
+            let survey = Survey::decode(path, (index, stamps.len()), &opened.codec)?;
             refused = survey.refused;
             let pictures = survey.pictures();
             let ordered = PresentationOrder::from_pictures(&pictures, stamps, time_base, rate);
@@ -150,6 +151,18 @@ impl Video {
     /// no other.
     pub fn key_frames(&self) -> &[u64] {
         &self.track.keys
+    }
+
+    /// A frame and those after it, up to the next that can be decoded without any other; the frame alone, if only a decoder
+    /// tells which frames there are.
+    pub fn until_next_key(&self, number: u64) -> Range<u64> {
+        let keys = self.key_frames();
+        if keys.is_empty() {
+            return number..number + 1;
+        }
+        let next = keys.partition_point(|&key| key <= number);
+        let end = keys.get(next).copied();
+        number..end.unwrap_or(self.frames().len() as u64)
     }
 
     /// Signs that the file is incomplete or damaged, one phrase each; empty if there are none.

@@ -30,8 +30,12 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// Decodes a stream from its beginning to its end.
-    pub(super) fn decode(path: &Path, stream: usize, codec: &str) -> Result<Self, VideoError> {
+    /// Decodes a stream of so many packets from its beginning to its end.
+    pub(super) fn decode(
+        path: &Path,
+        (stream, packets): (usize, usize),
+        codec: &str,
+    ) -> Result<Self, VideoError> {
         let mut input = open_input(path)?;
         let parameters = input
             .stream(stream)
@@ -55,6 +59,7 @@ impl Survey {
         // FFmpeg also refuses packets without a picture.
         let mut silent = 0;
         let mut errors = 0;
+        let mut read = 0;
         loop {
             // A packet that is read into again would keep the memory of what it held.
             let mut packet = Packet::empty();
@@ -63,6 +68,7 @@ impl Survey {
                 Ok(()) => {}
                 Err(_) => break,
             }
+            read += 1;
             begun |= packet.is_key();
             let data = packet.data().unwrap_or_default();
             let has_picture = byte_stream.as_ref().is_none_or(|by| by.has_picture(data));
@@ -73,6 +79,12 @@ impl Survey {
             if errors > silent && survey.broken_by.is_none() && failed > 0 && begun {
                 survey.broken_by = Some(survey.stamps.len() as u64);
             }
+        }
+        if read < packets {
+            return Err(VideoError::unreadable(
+                path,
+                "became shorter while it was read: is it being written, or is its disk gone?",
+            ));
         }
         if decoder.send_eof().is_ok() {
             errors += survey.drain(&mut decoder);
