@@ -104,6 +104,16 @@ impl Write for Partial {
 }
 
 impl SealedPartial {
+    /// All bytes of the file that will appear at `path`, synced to disk.
+    ///
+    /// # Errors
+    /// If any step fails; the temporary file is then removed.
+    pub fn write(path: &Path, bytes: &[u8]) -> io::Result<Self> {
+        let mut partial = Partial::create(path)?;
+        partial.write_all(bytes)?;
+        partial.seal()
+    }
+
     /// The final path.
     pub fn target(&self) -> &Path {
         &self.names.target
@@ -124,9 +134,7 @@ impl SealedPartial {
 /// # Errors
 /// If any step fails; the temporary file is then removed.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut partial = Partial::create(path)?;
-    partial.write_all(bytes)?;
-    partial.seal()?.publish()
+    SealedPartial::write(path, bytes)?.publish()
 }
 
 /// A folder that was there, or that was made with those around it. What was made and is empty when this is dropped is

@@ -1,10 +1,10 @@
 //! The files of a mask: their names, and which of those that exist may be replaced.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::durable::{self, CreatedFolder, Partial, SealedPartial};
+use relit_data::durable::{self, CreatedFolder, SealedPartial};
 
 use super::{MaskRecord, MaskingError};
 
@@ -121,17 +121,11 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), MaskingError> {
     durable::write_whole(path, bytes).map_err(MaskingError::io(path, "written"))
 }
 
-fn sealed_file(path: &Path, bytes: &[u8]) -> io::Result<SealedPartial> {
-    let mut partial = Partial::create(path)?;
-    partial.write_all(bytes)?;
-    partial.seal()
-}
-
 /// Writes files in this order, none before all of them are on the disk.
 pub(super) fn write_all(files: &[(&Path, &[u8])]) -> Result<(), MaskingError> {
     let mut sealed = Vec::with_capacity(files.len());
     for (path, bytes) in files {
-        sealed.push(sealed_file(path, bytes).map_err(MaskingError::io(path, "written"))?);
+        sealed.push(SealedPartial::write(path, bytes).map_err(MaskingError::io(path, "written"))?);
     }
     for (file, (path, _)) in sealed.into_iter().zip(files) {
         file.publish().map_err(MaskingError::io(path, "written"))?;
